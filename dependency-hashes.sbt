@@ -1,5 +1,6 @@
-// Holds every artifact that sbt resolves to its SHA-256 in project/dependencies.sha256: dependencies, plugins, compiler.
-// project/dependency-hashes.sbt links here, so that the build of the build (its plugins) is held by the same lines.
+// Holds every artifact that sbt resolves to its SHA-256 in project/dependencies.sha256: dependencies, plugins,
+// compiler. project/dependency-hashes.sbt links here, so that the build of the build (its plugins) is held by the same
+// lines.
 
 import sbt.librarymanagement._
 
@@ -25,7 +26,8 @@ def sha256(file: File): String =
     }
   )
 
-// What was resolved, as organization:name:version:file. An editor may ask for sources and documentation: they never run.
+// What was resolved, as organization:name:version:file. An editor may ask for sources and documentation: they never
+// run.
 def artifacts(report: UpdateReport): Seq[(File, String)] = (for {
   configuration    <- report.configurations
   module           <- configuration.modules

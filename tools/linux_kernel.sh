@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Makes what tools/linux boots: Debian's kernel for arm64 and busybox, and the kernel's UIO driver, which Debian leaves out,
-# compiled from Debian's source of the same kernel. apt fetches the packages and checks Debian's signatures; they are not
-# installed. Usage: tools/linux_kernel.sh FOLDER, after tools/environment linux
+# Makes what tools/linux boots: Debian's kernel for arm64 and busybox, and the kernel's UIO driver, which Debian leaves
+# out, compiled from Debian's source of the same kernel. apt fetches the packages and checks Debian's signatures; they
+# are not installed. Usage: tools/linux_kernel.sh FOLDER, after tools/environment linux
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/programs.sh"
 environment="$1"

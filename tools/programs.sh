@@ -13,7 +13,8 @@ sbt_launcher_sha256=1750c8fb61c2d2f82da40b2cd9014f4d8a1bd49a361402ea5b1cec061ed6
 sbt_boot="$root/.cache/sbt-boot-$sbt_version" # sbt itself, as the launcher fetches it
 uv="$root/.venv/bin/uv"
 
-# Minimum versions. Verilator: the oldest that the tests ran with; keep host/colonnade/{design/toolchain,device/compiler}.py equal.
+# Minimum versions. Verilator: the oldest that the tests ran with; keep
+# host/colonnade/{design/toolchain,device/compiler}.py equal.
 minimum_verilator=5.006
 minimum_gxx=10
 minimum_make=4.0

@@ -31,9 +31,9 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
 
 /** The device: columns of path tracers, run frame by frame.
   *
-  * The host loads the records, writes the frame registers and starts the frame. It accepts pixels until `done`, then reads
-  * errors and counters. A frame with an error bit is invalid. An aborted frame withdraws pixels that the sink has not
-  * accepted.
+  * The host loads the records, writes the frame registers and starts the frame. It accepts pixels until `done`, then
+  * reads errors and counters. A frame with an error bit is invalid. An aborted frame withdraws pixels that the sink has
+  * not accepted.
   *
   * @param pathTracer makes the path tracer of a column; specs pass another one with the same ports
   */

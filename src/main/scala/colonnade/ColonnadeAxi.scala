@@ -21,8 +21,8 @@ trait ShellPins {
   def refitPins: Option[AxiPins] = None
 }
 
-/** The device in its AXI4 shell: registers by AXI4-Lite, images read and frames written by an AXI4 master, an interrupt;
-  * docs/bus-shell.md.
+/** The device in its AXI4 shell: registers by AXI4-Lite, images read and frames written by an AXI4 master, an
+  * interrupt; docs/bus-shell.md.
   *
   * @param pathTracer makes the path tracer of a column; specs pass another one with the same ports
   */

@@ -32,8 +32,8 @@ final class ColonnadeRaysIO(config: ColonnadeConfig) extends Bundle {
   val batchError = Output(Bool())
 }
 
-/** A device that answers rays of applications: docs/rays.md. The host loads the records, writes the registers, puts batches
-  * into the ring, and moves `rays.tail`.
+/** A device that answers rays of applications: docs/rays.md. The host loads the records, writes the registers, puts
+  * batches into the ring, and moves `rays.tail`.
   */
 final class ColonnadeRays(config: ColonnadeConfig) extends Module {
   require(config.frame.rays, "a device for rays needs frame.rays=true")

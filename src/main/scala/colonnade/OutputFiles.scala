@@ -83,7 +83,8 @@ object OutputFiles {
       Using.resource(Files.walk(tree))(_.sorted(Comparator.reverseOrder[Path]()).forEach(Files.delete(_)))
 }
 
-/** `colonnade.core`, which describes a design for FuseSoC: its files, in the order of `filelist.f`, and its top module. */
+/** `colonnade.core`, which describes a design for FuseSoC: its files, in the order of `filelist.f`, and its top module.
+  */
 object CoreFile {
   val name: String = "colonnade.core"
 

@@ -159,8 +159,8 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
     until("frameDone") shouldBe Set("frameDone")
   }
 
-  /** Hostile batches, of which a soft reset ends some at any cycle. Later ones have the hits of the model, and nothing is
-    * written beyond the window.
+  /** Hostile batches, of which a soft reset ends some at any cycle. Later ones have the hits of the model, and nothing
+    * is written beyond the window.
     */
   def fuzz(rounds: Int): Unit = {
     val batches  = Seq.tabulate(rounds)(i => stimulus.batch(1 + random.nextInt(80), i % 3, i / 3 % 3))

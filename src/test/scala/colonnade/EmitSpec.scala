@@ -71,8 +71,8 @@ class EmitSpec extends AnyFlatSpec with Matchers with Properties {
     })
   }
 
-  /** Verilator's warnings for the modules of a device. It reads and checks each module once; with `--lint-only` it would
-    * flatten the array, and take a time by its size. Older versions write XML.
+  /** Verilator's warnings for the modules of a device. It reads and checks each module once; with `--lint-only` it
+    * would flatten the array, and take a time by its size. Older versions write XML.
     */
   private def lint(config: ColonnadeConfig): String = Scratch { scratch =>
     Emit(new Colonnade(config), scratch, blackBoxMemories = false)

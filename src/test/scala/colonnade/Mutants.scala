@@ -14,9 +14,10 @@ import scala.collection.mutable
 import scala.jdk.CollectionConverters._
 import scala.util.Try
 
-/** Random faults in the circuits of [[KeptSimulators]], all in one simulator: an input of each module chooses one by its
-  * number, and 0 none. A fault is another operation, the other way of a multiplexer, or an inverted bit, at a place in the
-  * sources of the hardware; so it is the same in every shape of a module, and in every test that simulates the module.
+/** Random faults in the circuits of [[KeptSimulators]], all in one simulator: an input of each module chooses one by
+  * its number, and 0 none. A fault is another operation, the other way of a multiplexer, or an inverted bit, at a place
+  * in the sources of the hardware; so it is the same in every shape of a module, and in every test that simulates the
+  * module.
   */
 object Mutants {
 
@@ -134,8 +135,9 @@ object Mutants {
     BigInt(1, MessageDigest.getInstance("SHA-256").digest(text.getBytes(UTF_8)).take(8))
 }
 
-/** Runs tests of suites against random faults ([[Mutants]]), for `tools/mutations --random`. Writes a line of JSON for each
-  * test, with its CPU seconds; for each fault that it was given, with whether it found it; and for each suite's end.
+/** Runs tests of suites against random faults ([[Mutants]]), for `tools/mutations --random`. Writes a line of JSON for
+  * each test, with its CPU seconds; for each fault that it was given, with whether it found it; and for each suite's
+  * end.
   *
   * Arguments: the file of the lines, which is continued; the seed; faults of a file of the sources; suites.
   */
@@ -182,7 +184,9 @@ object RandomMutants {
     }
   }
 
-  /** A test without a fault, if it simulates a circuit that has some; run twice, as the first time builds the simulator. */
+  /** A test without a fault, if it simulates a circuit that has some; run twice, as the first time builds the
+    * simulator.
+    */
   private def clean(suite: Suite, name: String): Option[Test] = {
     Mutants.present.clear()
     require(passes(suite, name, 0, Long.MaxValue), s"$name fails without a fault")

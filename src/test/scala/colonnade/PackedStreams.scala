@@ -47,8 +47,8 @@ abstract class PackedUnit[I <: Data, O <: Data](input: I, output: O) extends Mod
 
 object PackedStreams {
 
-  /** Sends all payloads with random bubbles and accepts as many results with random stalls. The input is random while no
-    * payload is offered.
+  /** Sends all payloads with random bubbles and accepts as many results with random stalls. The input is random while
+    * no payload is offered.
     *
     * @param offered  probability that the next payload is offered in a cycle
     * @param accepted probability that a result is accepted in a cycle

@@ -9,8 +9,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import java.nio.file.{Files, Path, Paths}
 
-/** Proofs of a module by Yosys and abc (`lab/colonnade_lab/units/proof.py`): for all inputs that meet its assumptions, its
-  * assertions hold in the cycles that follow one cycle of reset. A spec is cancelled where Yosys is not installed.
+/** Proofs of a module by Yosys and abc (`lab/colonnade_lab/units/proof.py`): for all inputs that meet its assumptions,
+  * its assertions hold in the cycles that follow one cycle of reset. A spec is cancelled where Yosys is not installed.
   *
   * A proof also fails if it is empty: nothing is asserted, the assumptions contradict one another, or a `cover` cannot
   * happen. Its files are in `test_run_dir`, in a folder with the test's name.

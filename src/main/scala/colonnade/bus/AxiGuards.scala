@@ -51,9 +51,9 @@ final class AxiWriteGuardIO(idBits: Int, busBytes: Int) extends Bundle {
 
 /** Ends the write bursts of a master that is reset: their remaining beats write no bytes, and their answers are taken.
   *
-  * It outlives the reset of the master, so the bus always sees whole bursts, and valid signals that hold. A beat passes in
-  * one cycle. Data are offered from the second cycle after their address on, whether it has been accepted or not. At most
-  * `maxBursts` bursts wait for their answers.
+  * It outlives the reset of the master, so the bus always sees whole bursts, and valid signals that hold. A beat passes
+  * in one cycle. Data are offered from the second cycle after their address on, whether it has been accepted or not. At
+  * most `maxBursts` bursts wait for their answers.
   */
 final class AxiWriteGuard(idBits: Int, busBytes: Int, maxBursts: Int = AxiWriteGuard.maxBursts) extends Module {
   val io = IO(new AxiWriteGuardIO(idBits, busBytes))
@@ -62,8 +62,8 @@ final class AxiWriteGuard(idBits: Int, busBytes: Int, maxBursts: Int = AxiWriteG
   private val aw     = Module(new Queue(io.axi.aw.bits.cloneType, 2))
   private val w      = Module(new Queue(io.axi.w.bits.cloneType, 2))
 
-  // Beats that are owed for each address that has been offered, in order. They do not wait until it is accepted: a memory
-  // may wait for them first (AXI4, A3.3.1).
+  // Beats that are owed for each address that has been offered, in order. They do not wait until it is accepted: a
+  // memory may wait for them first (AXI4, A3.3.1).
   private val owed        = Module(new Queue(UInt(8.W), maxBursts))
   private val beats       = RegInit(0.U(8.W))
   private val isAnnounced = RegNext(io.axi.aw.valid && !io.axi.aw.ready, false.B)
@@ -114,8 +114,8 @@ final class AxiWindowIO(idBits: Int, busBytes: Int) extends Bundle {
   val writeIsIdle = Input(Bool())
 }
 
-/** Keeps a master's bursts in a window: one that leaves it does not reach the bus, and is answered by an error, when the
-  * bursts before it have ended. Its beats are discarded, or have no value.
+/** Keeps a master's bursts in a window: one that leaves it does not reach the bus, and is answered by an error, when
+  * the bursts before it have ended. Its beats are discarded, or have no value.
   */
 final class AxiWindow(idBits: Int, busBytes: Int) extends Module {
   val io = IO(new AxiWindowIO(idBits, busBytes))

@@ -29,8 +29,8 @@ final class RegisterAccess(addressBits: Int) extends Bundle {
 
 /** An AXI4-Lite slave: reads and writes become accesses, one at a time, reads and writes in turn when both wait.
   *
-  * Address and data of a write may come in any order. No output depends combinationally on an input. An access takes four
-  * cycles from its last channel to its answer, if the registers answer in the next cycle.
+  * Address and data of a write may come in any order. No output depends combinationally on an input. An access takes
+  * four cycles from its last channel to its answer, if the registers answer in the next cycle.
   */
 final class AxiLiteSlave(addressBits: Int) extends Module {
   val axi    = IO(Flipped(new AxiLitePort(addressBits)))

@@ -19,10 +19,10 @@ final class BurstWriterIO(config: ColonnadeConfig, shell: ShellConfig) extends B
 
 /** Writes rows of a tile, each as one burst.
   *
-  * Rows of narrow pixels may be narrower than the bus: they are one beat with the lanes of the row. Rows begin at multiples
-  * of their size, a power of two of at most 256 bytes, so no burst crosses 4 KB. A burst's beats follow each other; the
-  * address of the next one goes out during the last beat. A row takes two cycles at least: in the first one its address is
-  * compared with the window.
+  * Rows of narrow pixels may be narrower than the bus: they are one beat with the lanes of the row. Rows begin at
+  * multiples of their size, a power of two of at most 256 bytes, so no burst crosses 4 KB. A burst's beats follow each
+  * other; the address of the next one goes out during the last beat. A row takes two cycles at least: in the first one
+  * its address is compared with the window.
   */
 final class BurstWriter(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   val io = IO(new BurstWriterIO(config, shell))

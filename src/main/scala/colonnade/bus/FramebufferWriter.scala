@@ -35,8 +35,8 @@ final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) ext
   val errors = Output(new WriterErrors) // until cleared
 }
 
-/** Writes pixels to the framebuffer: encodes them, gathers them to rows of tiles, puts the photo into the pixels that do
-  * not show the object, and writes each row as a burst.
+/** Writes pixels to the framebuffer: encodes them, gathers them to rows of tiles, puts the photo into the pixels that
+  * do not show the object, and writes each row as a burst.
   *
   * A row outside the window is dropped. After a write that fails, all rows are dropped until the errors are cleared.
   */

@@ -160,7 +160,9 @@ object ImageLoader {
   /** A memory of the device: `words` of 32 bits for each of at most `depth` records. */
   final case class Shape(target: Int, words: Int, depth: Int)
 
-  /** All memories that an image may fill. With a cache the scene lies in DRAM; without an environment there are none then. */
+  /** All memories that an image may fill. With a cache the scene lies in DRAM; without an environment there are none
+    * then.
+    */
   def shapes(config: ColonnadeConfig): Seq[Shape] = {
     val records = Shape(0, new RecordFormats(config).recordBits / 32, config.columnBvhMemory.depth)
     Option.when(config.columnBvhMemory.cache.isEmpty)(records).toSeq ++

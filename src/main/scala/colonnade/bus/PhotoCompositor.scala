@@ -20,9 +20,9 @@ final class PhotoCompositorIO(config: ColonnadeConfig, shell: ShellConfig) exten
 
 /** Puts the camera's photo, darkened by the shadow ratios, into the pixels of a row that do not show the object.
   *
-  * A row with such pixels reads its part of the photo, one burst; up to [[PhotoCompositor.maxRows]] rows wait for theirs.
-  * Rows leave in order, at the pace of the bus: as many pixels per cycle as a beat has, [[PhotoPixel.latency]] cycles after
-  * their beat.
+  * A row with such pixels reads its part of the photo, one burst; up to [[PhotoCompositor.maxRows]] rows wait for
+  * theirs. Rows leave in order, at the pace of the bus: as many pixels per cycle as a beat has, [[PhotoPixel.latency]]
+  * cycles after their beat.
   */
 final class PhotoCompositor(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   import PhotoCompositor._
@@ -130,8 +130,8 @@ object PhotoCompositor {
 
 /** A pixel of the photo times its shadow ratio, in the framebuffer's format; docs/bus-shell.md. One per cycle.
   *
-  * The photo's sRGB code becomes 16 linear bits, by a table. The strength of the shadow moves the ratio to 1.0. Their product
-  * is rounded to 16 bits.
+  * The photo's sRGB code becomes 16 linear bits, by a table. The strength of the shadow moves the ratio to 1.0. Their
+  * product is rounded to 16 bits.
   */
 final class PhotoPixel(config: ColonnadeConfig) extends Module {
   import PhotoPixel._

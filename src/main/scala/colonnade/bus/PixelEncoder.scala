@@ -94,8 +94,8 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
 
 /** Encodes a linear channel as 8 bits of sRGB (IEC 61966-2-1), rounded to the nearest code.
   *
-  * A search by halves in the table of the least linear values of all codes, two bits of the code in each of four cycles in
-  * which `enable` lets values move.
+  * A search by halves in the table of the least linear values of all codes, two bits of the code in each of four cycles
+  * in which `enable` lets values move.
   *
   * @param linearBits width of a linear value; all ones is 1.0
   */

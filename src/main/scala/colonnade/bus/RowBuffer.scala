@@ -22,8 +22,9 @@ final class TileRow(config: ColonnadeConfig, wordBits: Int = 8 * PixelFormat.max
 
 /** Gathers the pixels of a column, which come in any order, to rows of a tile: a write-combining buffer.
   *
-  * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle, in three cycles:
-  * it is compared with the rows, joins one, and is written. A row leaves in three, and is chosen in the cycle before.
+  * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle, in three
+  * cycles: it is compared with the rows, joins one, and is written. A row leaves in three, and is chosen in the cycle
+  * before.
   */
 final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   private val tileBits = log2Ceil(config.frame.tileSize)

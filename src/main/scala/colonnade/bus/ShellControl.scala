@@ -32,7 +32,9 @@ final class ShellControlIO extends Bundle {
   val loaderIsIdle = Input(Bool())
   val loadError    = Input(Bool())
 
-  /** Resets the device, the writer and the loader, and abandons their bursts, until the bus is idle; the same a cycle early. */
+  /** Resets the device, the writer and the loader, and abandons their bursts, until the bus is idle; the same a cycle
+    * early.
+    */
   val reset     = Output(Bool())
   val resetNext = Output(Bool())
   val busIsIdle = Input(Bool())
@@ -40,8 +42,9 @@ final class ShellControlIO extends Bundle {
 
 /** Runs frames and loads, one at a time, and soft resets.
   *
-  * A frame ends when the device has ended it, all its rows are written and all writes are answered. A frame that is started
-  * while one runs is queued, and begins when the device has its registers. A soft reset takes effect in any state.
+  * A frame ends when the device has ended it, all its rows are written and all writes are answered. A frame that is
+  * started while one runs is queued, and begins when the device has its registers. A soft reset takes effect in any
+  * state.
   */
 final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   import ShellControl._
@@ -131,7 +134,9 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
 object ShellControl {
   val resetCycles: Int = 8 // of the shortest soft reset
 
-  /** What a soft reset resets. An extra slice drives it from a register; the device then runs for a cycle after power-up. */
+  /** What a soft reset resets. An extra slice drives it from a register; the device then runs for a cycle after
+    * power-up.
+    */
   def clears(config: ColonnadeConfig, reset: Bool, control: ShellControlIO): Bool = {
     val slice = TimingSlice.extra(config)
     if (slice.isEnabled) slice.flag(reset || control.resetNext, atReset = true) else reset || control.reset

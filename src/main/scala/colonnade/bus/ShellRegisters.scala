@@ -15,8 +15,8 @@ final class ShellCommands extends Bundle {
   val start = Bool()
 }
 
-/** The state of the shell, in the order of `status`, bit 0 last: it is in a soft reset, loads an image, has a frame that
-  * waits for the end of the running one, runs a frame.
+/** The state of the shell, in the order of `status`, bit 0 last: it is in a soft reset, loads an image, has a frame
+  * that waits for the end of the running one, runs a frame.
   */
 final class ShellStatus extends Bundle {
   val isResetting = Bool()
@@ -69,12 +69,12 @@ final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extend
 }
 
 /** The registers of [[ShellMap]], and the way to the device's. What is written there while a frame runs waits for
-  * its end; all of the device's registers fit. A device for rays takes its tail while batches run, and its other registers
-  * while none does.
+  * its end; all of the device's registers fit. A device for rays takes its tail while batches run, and its other
+  * registers while none does.
   *
-  * A request is answered two cycles later; the device's register port is registered. The answer is an error, and a write
-  * has no effect, if the address has no register, the register cannot be written or not now, some bytes of the word are
-  * not written, or the value does not fit.
+  * A request is answered two cycles later; the device's register port is registered. The answer is an error, and a
+  * write has no effect, if the address has no register, the register cannot be written or not now, some bytes of the
+  * word are not written, or the value does not fit.
   */
 final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   val io = IO(new ShellRegistersIO(config, shell))

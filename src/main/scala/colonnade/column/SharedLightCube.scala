@@ -12,8 +12,8 @@ final class SharedLightCubeIO(config: ColonnadeConfig, columns: Int) extends Bun
   val ports = Vec(columns, Flipped(new CubePort))
 }
 
-/** The light cube of one or two columns. Each reads in a cycle of its own, so neither waits for the other, and a word comes
-  * two cycles after its request. A column requests in every other cycle at most.
+/** The light cube of one or two columns. Each reads in a cycle of its own, so neither waits for the other, and a word
+  * comes two cycles after its request. A column requests in every other cycle at most.
   */
 final class SharedLightCube(config: ColonnadeConfig, columns: Int) extends Module {
   require(1 <= columns && columns <= SharedLightCube.columns, "columns of a light cube")

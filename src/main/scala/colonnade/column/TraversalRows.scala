@@ -13,7 +13,8 @@ import colonnade.unit.{TraceResult, TraversalUnit}
 /** The traversal units of a column, their buses and triangle units, as parts of the module that makes them. */
 final private[colonnade] class TraversalRows(config: ColonnadeConfig) {
 
-  // A definition: the unit is elaborated once, not once per row. Without prefix the instances are TraversalUnit, TraversalUnit_1…
+  // A definition: the unit is elaborated once, not once per row. Without prefix the instances are TraversalUnit,
+  // TraversalUnit_1…
   private val definition = Definition(new TraversalUnit(TraversalConfig(config)))
 
   /** By row. Their requests and events are the column's. */
@@ -67,8 +68,8 @@ final class RayBusIO(config: ColonnadeConfig) extends Bundle {
 /** Sends each ray to a traversal unit with an idle context, by round-robin, so that rays spread evenly.
   *
   * Throughput: a ray a cycle, to one unit every other cycle. Latency: one cycle. The unit that receives a ray is not
-  * chosen for the next one in the same cycle, because `isFree` does not count that ray yet. So a ray on the bus is never
-  * refused.
+  * chosen for the next one in the same cycle, because `isFree` does not count that ray yet. So a ray on the bus is
+  * never refused.
   */
 final class RayBus(config: ColonnadeConfig) extends Module {
   val io = IO(new RayBusIO(config))

@@ -14,9 +14,9 @@ final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle 
   val waits = Input(Vec(count, Bool())) // by row: a record waits for a triangle unit
 }
 
-/** Triangle units of a group of rows: docs/traversal.md, triangle groups. A row is chosen one cycle before it may grant a
-  * record to a context, so a record takes three cycles more than in a group of one row, and its results one. Throughput: a
-  * record and a result per cycle. A row that keeps waiting is one of the next `count` chosen.
+/** Triangle units of a group of rows: docs/traversal.md, triangle groups. A row is chosen one cycle before it may grant
+  * a record to a context, so a record takes three cycles more than in a group of one row, and its results one.
+  * Throughput: a record and a result per cycle. A row that keeps waiting is one of the next `count` chosen.
   *
   * @param count rows
   */
@@ -66,7 +66,9 @@ object TriangleGroup {
 final class TriangleGrantsIO(count: Int) extends Bundle {
   val waits = Input(UInt(count.W)) // by row: a record waits
 
-  /** Records in the queue, at most [[TriangleGroup.queueDepth]], and whether a triangle unit takes one in the next cycle. */
+  /** Records in the queue, at most [[TriangleGroup.queueDepth]], and whether a triangle unit takes one in the next
+    * cycle.
+    */
   val queued    = Input(UInt(log2Ceil(TriangleGroup.queueDepth + 1).W))
   val readyNext = Input(Bool())
 

@@ -11,8 +11,8 @@ object Context {
 
 /** A table with one entry per context, as a memory with one read port and one write port.
   *
-  * The entry comes in the cycle after the read, and is valid in that cycle only. Read-during-write is undefined: no entry
-  * is read in the cycle in which it is written.
+  * The entry comes in the cycle after the read, and is valid in that cycle only. Read-during-write is undefined: no
+  * entry is read in the cycle in which it is written.
   */
 object ContextTable {
   def apply[T <: Data](config: PartConfig, entry: T): SyncReadMem[T] =

@@ -28,11 +28,12 @@ final class Timed[T <: Data](bits: T, windows: Seq[(Int, Int)]) {
   def last: Int  = windows.last._2
 }
 
-/** A modulo schedule: an operation starts every `interval` cycles, and each takes the same steps in the same cycles. So one
-  * unit serves up to `interval` steps of an operation, while other units work on the operations before and after it.
+/** A modulo schedule: an operation starts every `interval` cycles, and each takes the same steps in the same cycles. So
+  * one unit serves up to `interval` steps of an operation, while other units work on the operations before and after
+  * it.
   *
-  * Nothing ever stalls. The schedule is checked at elaboration: two steps of one unit in the same cycle modulo the interval,
-  * and a register that is read in a cycle in which it holds another value, are errors.
+  * Nothing ever stalls. The schedule is checked at elaboration: two steps of one unit in the same cycle modulo the
+  * interval, and a register that is read in a cycle in which it holds another value, are errors.
   *
   * @param phase counts the cycles modulo the interval; an operation starts in phase 0
   */
@@ -97,8 +98,8 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
     arriving(delayed, cycles.map(_ + by))
   }
 
-  /** The exact product of two factors that are there for an interval from a cycle on. A digit of the right one is multiplied
-    * in each cycle, the lowest first; the product comes in the second cycle after.
+  /** The exact product of two factors that are there for an interval from a cycle on. A digit of the right one is
+    * multiplied in each cycle, the lowest first; the product comes in the second cycle after.
     */
   def multiply(left: Timed[SInt], right: Timed[SInt], first: Int): Timed[SInt] = {
     val cycles    = first until first + interval

@@ -6,9 +6,9 @@ import colonnade.config.ColonnadeConfig
 
 /** Registers that cut a long path: what passes comes a cycle later.
   *
-  * A slice that costs no throughput is always there: `TimingSlice(signal)`. In the traversal loop and in the caches a cycle
-  * more costs rays per cycle. There a slice exists with `units.extraSlices` only: `TimingSlice.extra(config)` makes it, or
-  * what passes everything on as it is.
+  * A slice that costs no throughput is always there: `TimingSlice(signal)`. In the traversal loop and in the caches a
+  * cycle more costs rays per cycle. There a slice exists with `units.extraSlices` only: `TimingSlice.extra(config)`
+  * makes it, or what passes everything on as it is.
   */
 sealed class TimingSlice private[common] (val isEnabled: Boolean) {
   val cycles: Int = if (isEnabled) 1 else 0 // latency
@@ -43,9 +43,9 @@ final class DelayLineIO[T <: Data](value: T) extends Bundle {
 
 /** Carries values along a pipeline that may stall, in a memory of `delay` words in place of shift registers.
   *
-  * A value written with a move comes out `delay` moves later; it is `in` before the first of them. `out` stays until the
-  * next move with `reads`: a register holds it, so that a stall costs no read of the memory. A word is never read in the
-  * cycle in which it is written.
+  * A value written with a move comes out `delay` moves later; it is `in` before the first of them. `out` stays until
+  * the next move with `reads`: a register holds it, so that a stall costs no read of the memory. A word is never read
+  * in the cycle in which it is written.
   *
   * @param isSteady false: `out` is valid for one cycle
   */
@@ -79,8 +79,8 @@ final class ReservedQueueIO[T <: Data](item: T) extends Bundle {
 }
 
 /** A queue in a memory with one read port and one write port, for items that have their place reserved: it has no
-  * back-pressure. An item is offered from the second cycle after it came until it is taken, if it may be. Each cycle of an
-  * offer takes a read.
+  * back-pressure. An item is offered from the second cycle after it came until it is taken, if it may be. Each cycle of
+  * an offer takes a read.
   */
 final class ReservedQueue[T <: Data](item: T, places: Int) extends Module {
   require(places > 1, s"a queue of $places places; it must have two at least")

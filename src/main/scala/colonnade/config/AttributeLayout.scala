@@ -2,8 +2,8 @@ package colonnade.config
 
 /** Sizes of the parts of the physical-attribute memory. `formats.AttributeRecords` defines the words.
   *
-  * A two-level map and the plane map have a descriptor per tile. The bytes that the fixed parts leave are their heap, to
-  * which descriptors point. A SLIC map has a seed per tile and a label per block; it takes what these need.
+  * A two-level map and the plane map have a descriptor per tile. The bytes that the fixed parts leave are their heap,
+  * to which descriptors point. A SLIC map has a seed per tile and a label per block; it takes what these need.
   */
 final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends TileGrid {
   import AttributeLayout._

@@ -4,8 +4,8 @@ import java.io.IOException
 import java.nio.charset.StandardCharsets.UTF_8
 import java.nio.file.{Files, InvalidPathException, Paths}
 
-/** Configurations as JSON, for which [[ColonnadeConfig]] has the names, types and defaults of all keys; `precision` may also
-  * be written in the paper's notation, as in `"32b32s64d"`. No other key is accepted. Files of older versions are
+/** Configurations as JSON, for which [[ColonnadeConfig]] has the names, types and defaults of all keys; `precision` may
+  * also be written in the paper's notation, as in `"32b32s64d"`. No other key is accepted. Files of older versions are
   * migrated, see `ConfigMigration`. All failures are [[ConfigError]]s.
   */
 object ConfigIO {
@@ -14,8 +14,8 @@ object ConfigIO {
   lazy val presets: Seq[String] = resource("names").linesIterator.toSeq
   private val maxBytes = 1 << 20 // maximum size of a configuration file
 
-  /** The configuration of a preset's name, of a file, or of a precision such as `16b16s32d`: `small` with that precision
-    * and with triangle tests as wide as `precision.mac`.
+  /** The configuration of a preset's name, of a file, or of a precision such as `16b16s32d`: `small` with that
+    * precision and with triangle tests as wide as `precision.mac`.
     *
     * @param overrides `path.to.key=value`, applied in order; a value is JSON, or else a string without quotes
     */

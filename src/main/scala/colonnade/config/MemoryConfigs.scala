@@ -8,7 +8,8 @@ object MapEncoding {
   /** Each tile has a mode: two or four palette entries, and the size of the cells that select one of them. */
   object TwoLevel extends MapEncoding("twoLevel")
 
-  /** SLIC superpixels: a tile has one seed, and the label of a block of pixels selects one of the nine nearest seeds. */
+  /** SLIC superpixels: a tile has one seed, and the label of a block of pixels selects one of the nine nearest seeds.
+    */
   object Slic extends MapEncoding("slic")
 
   val all: Seq[MapEncoding] = Seq(TwoLevel, Slic)
@@ -28,7 +29,8 @@ object MapEncoding {
   * @param planes         entries of the plane table
   * @param planeBytes     bytes of plane map, plane table and bounding planes; the rest is heap, at most 16,384 bytes
   * @param boundingPlanes bounding planes, beyond the view
-  * @param columnsPerCopy columns that read one copy of the maps (docs/attributes.md#copies); more than the array has: all
+  * @param columnsPerCopy columns that read one copy of the maps (docs/attributes.md#copies); more than the array has:
+  *                       all
   */
 final case class PhysicalAttributeMemoryConfig(
     width:          Int = 640,
@@ -61,8 +63,8 @@ object PhysicalAttributeMemoryConfig {
   private val powers          = Seq(16, 32, 64, 128, 256) // an index has one byte at most
 }
 
-/** Caches between traversal units and a scene in DRAM: one in every column, and one that all columns share. A line is two
-  * records. Pairs of lines are interleaved over `columnBvhMemory.banks` banks in both.
+/** Caches between traversal units and a scene in DRAM: one in every column, and one that all columns share. A line is
+  * two records. Pairs of lines are interleaved over `columnBvhMemory.banks` banks in both.
   *
   * @param lines        lines of a column's cache: a power of two, at most 4,096, for each way and bank
   * @param ways         ways of a column's cache

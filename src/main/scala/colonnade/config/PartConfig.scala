@@ -2,8 +2,8 @@ package colonnade.config
 
 import chisel3.util.log2Ceil
 
-/** What a part of a column is built for: the device, and how many rays the part has in flight, one per context. A module
-  * that no context concerns takes the device's configuration.
+/** What a part of a column is built for: the device, and how many rays the part has in flight, one per context. A
+  * module that no context concerns takes the device's configuration.
   */
 sealed abstract class PartConfig {
   def device: ColonnadeConfig

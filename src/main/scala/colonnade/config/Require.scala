@@ -9,7 +9,8 @@ private[colonnade] object Require {
   /** Field and rule of what has failed within [[all]]; none outside, where a failure is an error at once. */
   private val failures = new DynamicVariable[Option[mutable.ListBuffer[(String, String)]]](None)
 
-  /** What `build` makes. All that it requires and does not find is one error; what it throws after a failure is not told.
+  /** What `build` makes. All that it requires and does not find is one error; what it throws after a failure is not
+    * told.
     */
   def all[T](build: => T): T =
     if (failures.value.nonEmpty) build

@@ -32,12 +32,12 @@ object AttributeMap {
   }
 }
 
-/** A map of tiles with two or four palette entries each. A mask selects the entry of each cell; a cell's size depends on
-  * the tile. See `MapDescriptor`.
+/** A map of tiles with two or four palette entries each. A mask selects the entry of each cell; a cell's size depends
+  * on the tile. See `MapDescriptor`.
   *
-  * Three reads in sequence: descriptor, mask, palette. Latency six cycles, one pixel a cycle. A tile of four entries has a
-  * word with two of them, which is read before the mask: its pixels take two cycles and a latency of seven. A word beyond
-  * the heap is 0 and makes the response illegal; the mask's word is the last one of a tile.
+  * Three reads in sequence: descriptor, mask, palette. Latency six cycles, one pixel a cycle. A tile of four entries
+  * has a word with two of them, which is read before the mask: its pixels take two cycles and a latency of seven. A
+  * word beyond the heap is 0 and makes the response illegal; the mask's word is the last one of a tile.
   *
   * @param name of the map in [[colonnade.formats.AttributeMemories]]
   */
@@ -90,10 +90,10 @@ final class TwoLevelMap[T <: Data](config: ColonnadeConfig, layout: TileGrid, na
   io.pixels.resp.bits.isIllegal := RegEnable(isIllegal, chosen.valid)
 }
 
-/** A map of SLIC superpixels. Each tile has a seed. Each block of pixels, a sixteenth of a tile, has a label of four bits,
-  * which selects one of the nine nearest seeds: 3 · (dy + 1) + (dx + 1). A word holds four labels, row by row from the low
-  * bits. A label above 8 selects the tile's own seed; a seed outside the map is the nearest one inside. Every content is
-  * legal.
+/** A map of SLIC superpixels. Each tile has a seed. Each block of pixels, a sixteenth of a tile, has a label of four
+  * bits, which selects one of the nine nearest seeds: 3 · (dy + 1) + (dx + 1). A word holds four labels, row by row
+  * from the low bits. A label above 8 selects the tile's own seed; a seed outside the map is the nearest one inside.
+  * Every content is legal.
   *
   * Two reads in sequence: label, seed. Latency five cycles, one pixel a cycle.
   *
@@ -134,8 +134,8 @@ final class SlicMap[T <: Data](config: ColonnadeConfig, layout: AttributeLayout,
   io.pixels.resp.bits.tag       := RegEnable(found.bits.tag, found.valid)
   io.pixels.resp.bits.isIllegal := false.B
 
-  /** The tile's position along an axis, moved as the label says; an axis has `count` tiles, and a step along it changes the
-    * label by `labelStep`.
+  /** The tile's position along an axis, moved as the label says; an axis has `count` tiles, and a step along it changes
+    * the label by `labelStep`.
     */
   private def neighbour(position: UInt, count: Int, labelStep: Int): UInt = {
     def moves(by: Int): Bool = VecInit((0 until 16).map(l => (l <= 8 && l / labelStep % 3 - 1 == by).B))(label)
@@ -155,8 +155,8 @@ final class PlaneMapIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   val planes = Flipped(new AttributeChannel(new PlaneRequest(layout), new BoundingPlaneEntry, tagBits))
 }
 
-/** The environment's planes. One channel gives the planes of a tile or cell, the other one a plane's coefficients; neither
-  * waits for the other.
+/** The environment's planes. One channel gives the planes of a tile or cell, the other one a plane's coefficients;
+  * neither waits for the other.
   */
 final class PlaneMap(config: ColonnadeConfig, tagBits: Int) extends Module {
   val io = IO(new PlaneMapIO(config, tagBits))

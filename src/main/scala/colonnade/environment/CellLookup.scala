@@ -14,11 +14,11 @@ final class CellLookupIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
 
 /** Looks up the planes of a pixel's tile, or the plane of its cell; see `PlaneDescriptor`. Mode 7 counts as 0.
   *
-  * A tile has consecutive words: two plane ids per word, then the cells' mask. A tile's ids are read word by word. For a
-  * cell its mask is read first, and then the word with the id that the mask selects. So each request takes two cycles at
-  * most, and columns that share the memory can count on that. Latency five cycles and one request a cycle if it needs at
-  * most one word; one cycle more for a second word. A word beyond the heap is 0 and makes the response illegal; the highest
-  * address decides: of a tile's last word, or of a cell's mask.
+  * A tile has consecutive words: two plane ids per word, then the cells' mask. A tile's ids are read word by word. For
+  * a cell its mask is read first, and then the word with the id that the mask selects. So each request takes two cycles
+  * at most, and columns that share the memory can count on that. Latency five cycles and one request a cycle if it
+  * needs at most one word; one cycle more for a second word. A word beyond the heap is 0 and makes the response
+  * illegal; the highest address decides: of a tile's last word, or of a cell's mask.
   */
 final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   val io = IO(new CellLookupIO(config, tagBits))

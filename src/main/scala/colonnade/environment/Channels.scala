@@ -56,8 +56,8 @@ final class PlaneRequest(layout: AttributeLayout) extends Bundle {
   val index           = UInt(layout.tableIndexBits.W)
 }
 
-/** All channels of a requester; they are independent of each other. Albedo and normal of a plane's response are valid for
-  * bounding planes only.
+/** All channels of a requester; they are independent of each other. Albedo and normal of a plane's response are valid
+  * for bounding planes only.
   *
   * @param tagBits bits of a tag; none of a single requester
   */

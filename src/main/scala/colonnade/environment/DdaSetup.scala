@@ -3,8 +3,8 @@ package colonnade.environment
 import chisel3._
 import colonnade.microcode.Overlap
 
-/** Set-up of the digital differential analyser (DDA) that walks through tiles: the ray's first tile, and along each axis
-  * the distance to the first tile edge and from edge to edge.
+/** Set-up of the digital differential analyser (DDA) that walks through tiles: the ray's first tile, and along each
+  * axis the distance to the first tile edge and from edge to edge.
   */
 final class DdaSetup(m: MarchOperations, cells: CellReader) {
   import m.formats._

@@ -29,8 +29,8 @@ final class DirectDepthIO(config: PathConfig) extends Bundle {
   val distance = Decoupled(new DirectDistance(config)) // in the order of the pixels
 }
 
-/** The distance of a directly seen point, from the plane of its pixel: 1 / (w · rate). A pixel every four cycles, by one
-  * multiplier for the plane, one for w · rate, and three dividers that take turns.
+/** The distance of a directly seen point, from the plane of its pixel: 1 / (w · rate). A pixel every four cycles, by
+  * one multiplier for the plane, one for w · rate, and three dividers that take turns.
   */
 final class DirectDepth(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config.device)

@@ -18,14 +18,16 @@ final class DirectPixel(config: PathConfig) extends Bundle {
 final class DirectPointIO(config: PathConfig) extends Bundle {
   val view = Input(new EnvironmentView(config.numbers))
 
-  /** Directly seen pixels, and hits of marches. The second source goes first; it offers a distance only with all other parts. */
+  /** Directly seen pixels, and hits of marches. The second source goes first; it offers a distance only with all other
+    * parts.
+    */
   val sources = Vec(2, Flipped(new PointSource(config)))
 
   val answer = Decoupled(new MarchAnswer(config)) // offered until it is taken
 }
 
-/** Position and normal of a directly seen point, or of a march's hit, and whether it hides the object's hit. A point every
-  * four cycles, by one multiplier for the position and three for the normal.
+/** Position and normal of a directly seen point, or of a march's hit, and whether it hides the object's hit. A point
+  * every four cycles, by one multiplier for the position and three for the normal.
   */
 final class DirectPoint(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config.device)

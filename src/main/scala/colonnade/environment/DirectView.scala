@@ -23,7 +23,8 @@ final class DirectViewIO(config: PathConfig) extends Bundle {
   * [[EnvironmentMarch]] finds. {{{
   *
   * order ─▶ DirectProjection ─┬─ pixel of the map ─▶ cells ─▶ planes ─┐
-  *                            ├─ place, rate of depth ──────────────▶ DirectDepth ─▶ distance ─┬─▶ DirectPoint ─▶ answer
+  *                            ├─ place, rate of depth ──────────────▶ DirectDepth ─▶ distance ─┬─▶ DirectPoint ─▶
+  * answer
   *                            │                                         └─▶ albedo, normals ──┘       ▲
   *                            └─ direction ───────────────────────────────────────────────────────────┘
   * }}}
@@ -128,8 +129,8 @@ object DirectView {
   val places:  Int = 16 // pixels in the pipeline
   val lookups: Int = 4  // cells that are asked for or wait for their plane; planes that are asked for or wait
 
-  /** Pixels from the request for their albedo to their answer: one in `DirectDepth` when it asks, one before the dividers,
-    * three in them, and two in `DirectPoint`.
+  /** Pixels from the request for their albedo to their answer: one in `DirectDepth` when it asks, one before the
+    * dividers, three in them, and two in `DirectPoint`.
     */
   val texels: Int = 8
 }

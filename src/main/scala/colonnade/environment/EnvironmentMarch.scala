@@ -7,12 +7,13 @@ import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 import colonnade.microcode.{Microprogram, Repeat}
 
-/** Finds the point of the environment that a ray hits, with its albedo and normal. It projects the ray into the map, where
-  * the ray is straight, and steps from tile to tile until the ray is no longer in front of the map's surfaces. A ray that
-  * leaves the map hits a bounding plane. A ray from the maps' camera hits what its pixel shows: it goes to
+/** Finds the point of the environment that a ray hits, with its albedo and normal. It projects the ray into the map,
+  * where the ray is straight, and steps from tile to tile until the ray is no longer in front of the map's surfaces. A
+  * ray that leaves the map hits a bounding plane. A ray from the maps' camera hits what its pixel shows: it goes to
   * [[DirectView]]. One from another camera is clipped to the maps' frustum; it hits what the maps show, or misses.
   *
-  * One ray at a time; its request is taken together with its result. docs/march.md describes the steps and their latency.
+  * One ray at a time; its request is taken together with its result. docs/march.md describes the steps and their
+  * latency.
   */
 final class EnvironmentMarch(config: PathConfig) extends Module {
   val io = IO(new EnvironmentMarchIO(config))

@@ -25,12 +25,12 @@ final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
   val events = Output(new MarchSums(config))
 }
 
-/** The marches of a column, and the pipeline for directly seen pixels. One request a cycle goes into the pipeline, or else
-  * to an empty march. A march is empty once [[MarchHits]] takes its hit, by round-robin. From there hits go to the
+/** The marches of a column, and the pipeline for directly seen pixels. One request a cycle goes into the pipeline, or
+  * else to an empty march. A march is empty once [[MarchHits]] takes its hit, by round-robin. From there hits go to the
   * pipeline's last stage, whose answers go back to the path unit.
   *
-  * An answer leaves as soon as the path unit stores no ray in the same cycle, and it stores at most one ray for each of its
-  * contexts without an answer. No answer waits for a request. So every request ends.
+  * An answer leaves as soon as the path unit stores no ray in the same cycle, and it stores at most one ray for each of
+  * its contexts without an answer. No answer waits for a request. So every request ends.
   */
 final class EnvironmentMarches(config: PathConfig) extends Module {
   val io = IO(new EnvironmentMarchesIO(config))

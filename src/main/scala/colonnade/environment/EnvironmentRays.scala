@@ -32,8 +32,8 @@ final class EnvironmentRaysIO(config: PathConfig) extends Bundle {
 /** Stores each context's ray, sends it to the marches of the column, and stores the point that comes back in its place,
   * until the shader takes it. So a result never waits for the shader, and all contexts may be under way at a time.
   *
-  * The table's read port serves an order, when the column takes one, and else the shader. A surface that has not been taken
-  * is read again, so `surface.valid` may fall before it is taken. A new ray goes before a result.
+  * The table's read port serves an order, when the column takes one, and else the shader. A surface that has not been
+  * taken is read again, so `surface.valid` may fall before it is taken. A new ray goes before a result.
   */
 final class EnvironmentRays(config: PathConfig) extends Module {
   val io = IO(new EnvironmentRaysIO(config))

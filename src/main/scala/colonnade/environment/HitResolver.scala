@@ -26,8 +26,8 @@ final class HitResolver(
 
   val index: UInt = Reg(UInt(view.boundingPlanes.getWidth.W)) // of a bounding plane, or of a plane of the frustum
 
-  /** The largest rate so far: of approach to distance of the bounding planes, or of distance to approach of the frustum's
-    * planes, which is the way to the last one.
+  /** The largest rate so far: of approach to distance of the bounding planes, or of distance to approach of the
+    * frustum's planes, which is the way to the last one.
     */
   val rateMantissa: UInt = Reg(UInt((f + 1).W))
   val rateExponent: SInt = Reg(SInt(shiftBits.W))
@@ -163,7 +163,9 @@ final class HitPixel(m: MarchOperations, stepper: TileStepper, hitDistance: UInt
   private val at   = Mux(purpose === cell, stepper.enter, Mux(purpose === hidden, stepper.frontDistance, hitDistance))
   private val size = (1.U << Mux(purpose === cell, layout.tileLog.U, stepper.frontLog)) - 1.U
 
-  /** In the step before a jump to `Pixel`: project the point where the ray enters the tile, and continue at `FirstCell`. */
+  /** In the step before a jump to `Pixel`: project the point where the ray enters the tile, and continue at
+    * `FirstCell`.
+    */
   def forCell(): Unit = set(purpose, cell)
 
   /** In the step before `Pixel`: project the hit, and continue at `HitDistance`. */

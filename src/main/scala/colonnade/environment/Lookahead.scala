@@ -2,8 +2,8 @@ package colonnade.environment
 
 import chisel3._
 
-/** A requester of a channel of the maps, at most one request in flight. A request may be made before it is known that its
-  * response is needed: the response is stored until a step takes it, or until it is dropped.
+/** A requester of a channel of the maps, at most one request in flight. A request may be made before it is known that
+  * its response is needed: the response is stored until a step takes it, or until it is dropped.
   *
   * @param keep the part of a response that is stored
   */

@@ -114,8 +114,8 @@ final class MarchDatapath(config: PathConfig) extends Module {
 
 /** Widths of the march; f is `shadeBits`.
   *
-  * Directions, projections and mantissas have f bits. The coordinates u, v and w reach 2^(f + 3), and so does the distance
-  * along the ray.
+  * Directions, projections and mantissas have f bits. The coordinates u, v and w reach 2^(f + 3), and so does the
+  * distance along the ray.
   */
 final class MarchFormats(config: ColonnadeConfig) {
   private val numbers = config.numbers
@@ -132,7 +132,8 @@ final class MarchFormats(config: ColonnadeConfig) {
   val distanceBits: Int = alongBits + guardBits
   val nearLog:      Int = 8 // log2 of a share of w: a ray that is behind a surface by less is on it
 
-  /** A ray that crosses tiles and cells this often ends. A map of the finest cells has 31 on the longest way through a tile.
+  /** A ray that crosses tiles and cells this often ends. A map of the finest cells has 31 on the longest way through a
+    * tile.
     */
   val maxSteps: Int = 512
   val stepBits: Int = log2Ceil(maxSteps + 1)

@@ -31,8 +31,8 @@ final class MarchHitsIO(config: PathConfig) extends Bundle {
 }
 
 /** Completes the hits of a column's marches, one after the other: divides for the distance while albedo and normal are
-  * fetched, and adds the way from the camera to the maps. 14 cycles a hit, with 32-bit formats and if the maps respond at
-  * once.
+  * fetched, and adds the way from the camera to the maps. 14 cycles a hit, with 32-bit formats and if the maps respond
+  * at once.
   *
   * It waits for responses of the maps alone, and [[DirectPoint]] for nothing but its result to be taken.
   */

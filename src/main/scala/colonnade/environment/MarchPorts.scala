@@ -83,7 +83,9 @@ final class MarchHit(config: PathConfig) extends Bundle {
   val pixel = new MapPixel(formats.layout) // `map`: the pixel with the point's albedo and normal
   val isHidden = Bool() // `map`: the point is on the extension of a surface, hidden by another one
 
-  /** The point is at numerator / denominator · 2^(f + exponent) times the ray's direction; of a camera's ray behind `way`. */
+  /** The point is at numerator / denominator · 2^(f + exponent) times the ray's direction; of a camera's ray behind
+    * `way`.
+    */
   val numerator, denominator = UInt(formats.f.W)
   val exponent               = SInt(formats.shiftBits.W)
   val way                    = new MarchWay(formats)
@@ -127,7 +129,9 @@ final class EnvironmentRequest(config: PathConfig) extends Bundle {
   val isOcclusionTest     = Bool() // the ray has hit the object: does the environment hide the hit?
 }
 
-/** Which requests are accepted in this cycle: rays from the camera, and others. So one kind does not wait for the other. */
+/** Which requests are accepted in this cycle: rays from the camera, and others. So one kind does not wait for the
+  * other.
+  */
 final class EnvironmentAccepts extends Bundle {
   val directView = Bool()
   val march      = Bool()

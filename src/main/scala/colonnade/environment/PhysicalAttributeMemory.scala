@@ -139,8 +139,8 @@ final class AttributeArbiterIO[Q <: Data, R <: Data](request: Q, response: R, co
   val joined = new AttributeChannel(request, response, AttributeArbiter.tagBits(count, tagBits))
 }
 
-/** Joins the channels of several requesters by round-robin, or the last one first. A response goes to all of them and is valid for the requester
-  * that its tag names.
+/** Joins the channels of several requesters by round-robin, or the last one first. A response goes to all of them and
+  * is valid for the requester that its tag names.
   *
   * One request a cycle. Requests and responses pass one register each, so that arbiters can form trees of any size.
   *
@@ -192,8 +192,8 @@ final class AttributeConcentratorIO(config: ColonnadeConfig, requesters: Int, ta
   val joined = new AttributePort(layout, AttributeArbiter.tagBits(requesters, tagBits))
 }
 
-/** Joins several ports into one, with an [[AttributeArbiter]] for each channel. Of a column's ports the last one goes first,
-  * the pipeline of directly seen pixels: it asks in every fourth cycle at most, and all pixels wait for it.
+/** Joins several ports into one, with an [[AttributeArbiter]] for each channel. Of a column's ports the last one goes
+  * first, the pipeline of directly seen pixels: it asks in every fourth cycle at most, and all pixels wait for it.
   */
 final class AttributeConcentrator(config: ColonnadeConfig, requesters: Int, tagBits: Int, ofColumn: Boolean)
     extends Module {

@@ -25,12 +25,12 @@ final class ClipTest(config: PathConfig) extends Bundle {
   val isOutside = Bool()
 }
 
-/** Moves the projected origin of a camera's ray along the ray into the frustum of the maps: to the last plane that the ray
-  * enters through. The planes are the near plane, where w is 1, and those through the maps' camera and lines a
+/** Moves the projected origin of a camera's ray along the ray into the frustum of the maps: to the last plane that the
+  * ray enters through. The planes are the near plane, where w is 1, and those through the maps' camera and lines a
   * quarter of a pixel within the edges of the maps, so that a rounded origin is in the maps.
   *
-  * [[HitResolver]] compares the ways to the planes, and keeps the longest one. All rays of a frame's camera have one origin: once
-  * it is known, only the planes that it is outside of are tested.
+  * [[HitResolver]] compares the ways to the planes, and keeps the longest one. All rays of a frame's camera have one
+  * origin: once it is known, only the planes that it is outside of are tested.
   */
 final class RayClip(
     m:        MarchOperations,

@@ -8,9 +8,9 @@ import colonnade.numbers.Rounding
 
 /** Projects a ray into the map: (u, v, w) of its origin and along its direction. In this space the ray is straight.
   *
-  * A matrix row times a vector is a sum of products of digits, highest digits first. Each component is normalised on its
-  * own and then aligned to the largest one; both roundings together are a single floor. A component needs the sum for
-  * two cycles: in the first one it is measured, in the second one shifted.
+  * A matrix row times a vector is a sum of products of digits, highest digits first. Each component is normalised on
+  * its own and then aligned to the largest one; both roundings together are a single floor. A component needs the sum
+  * for two cycles: in the first one it is measured, in the second one shifted.
   */
 final class RayProjection(m: MarchOperations, view: EnvironmentView, request: MarchRequest) {
   import MarchLabel._
@@ -42,8 +42,8 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   private val direction    = request.ray.dir.axes.map(ofRay)
   private val inverseDepth = m.quotient.zext
 
-  /** Steps that project the ray. They end at `Finish` if the origin is behind the camera, and at `BoundingPlanes` if it is
-    * outside the map.
+  /** Steps that project the ray. They end at `Finish` if the origin is behind the camera, and at `BoundingPlanes` if it
+    * is outside the map.
     */
   def describe(dda: DdaSetup): Unit = {
     matrixProduct(ProjectOrigin, m.uvwOrigin, m.uvwOriginExponent)(axis =>
@@ -97,8 +97,8 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
     at(3)(m.takeQuotient())
   }
 
-  /** The change of (u, v, w), times the depth: projectedDir − uvwOrigin · projectedDir₂; for w without the first term. Four
-    * cycles.
+  /** The change of (u, v, w), times the depth: projectedDir − uvwOrigin · projectedDir₂; for w without the first term.
+    * Four cycles.
     */
   private def uvwDir(at: Overlap[MarchLabel], axis: Int, begin: Int, isFirst: Boolean): Unit = {
     at(begin)(m.multiply(m.uvwOrigin(axis), m.projectedDir(2)))
@@ -108,8 +108,8 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
     normalise(at, m.uvwDir, m.uvwDirExponent, axis, begin + 2, isFirst)
   }
 
-  /** In a step before `ProjectOrigin`: the least exponent of the origin's block, which for a camera also holds the depth of
-    * the near plane. Or the camera's origin, if it is known.
+  /** In a step before `ProjectOrigin`: the least exponent of the origin's block, which for a camera also holds the
+    * depth of the near plane. Or the camera's origin, if it is known.
     */
   def clear(camera: Valid[CameraOrigin]): Unit = {
     val most  = ((BigInt(1) << exponentBits) - 1).U

@@ -31,8 +31,8 @@ final class TileLookupIO[D <: Data, T <: Data](config: ColonnadeConfig, layout: 
   val tile  = Decoupled(new PixelInTile(layout, descriptor, sideband))
 }
 
-/** Looks up the descriptor of a pixel's tile. Latency three cycles, one pixel a cycle, in order. A pixel is accepted only
-  * if there is space for its tile in the output queue, so a stalled output never loses one.
+/** Looks up the descriptor of a pixel's tile. Latency three cycles, one pixel a cycle, in order. A pixel is accepted
+  * only if there is space for its tile in the output queue, so a stalled output never loses one.
   *
   * @param memory name of the descriptors' memory
   */
@@ -77,7 +77,8 @@ object TileLookup {
   val latency: Int = 3
 }
 
-/** The march's position: the current interval of the ray in a tile or cell, and the last plane that it was in front of. */
+/** The march's position: the current interval of the ray in a tile or cell, and the last plane that it was in front of.
+  */
 final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
   import m.formats._
 
@@ -95,8 +96,8 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
   val steps:    UInt = Reg(UInt(stepBits.W)) // tiles and cells that the ray has passed
   val isBehind: Bool = Reg(Bool())           // the ray is behind the surfaces that the map shows
 
-  /** The last plane that the ray was in front of, if any. It was seen at the distance `frontDistance`, within 2^frontLog
-    * pixels of a corner.
+  /** The last plane that the ray was in front of, if any. It was seen at the distance `frontDistance`, within
+    * 2^frontLog pixels of a corner.
     */
   val hasFront:      Bool       = Reg(Bool())
   val front:         PlaneDepth = Reg(new PlaneDepth(m.formats))

@@ -93,9 +93,9 @@ object AttributeMemories {
 /** A tile of a two-level map.
   *
   * Modes 0 to 3 select one of two entries per cell; a cell's edge is a half, a quarter, an eighth or a sixteenth of the
-  * tile's. Modes 4 to 7 select one of four entries, for the same cells. The mask has one or two bits per cell, row by row
-  * from the low bit. It starts at the heap word `pointer`. With four entries, that word holds entries 2 (low byte) and 3,
-  * and the mask follows. In mode 0 the mask is the low bits of `pointer`.
+  * tile's. Modes 4 to 7 select one of four entries, for the same cells. The mask has one or two bits per cell, row by
+  * row from the low bit. It starts at the heap word `pointer`. With four entries, that word holds entries 2 (low byte)
+  * and 3, and the mask follows. In mode 0 the mask is the low bits of `pointer`.
   */
 final class MapDescriptor extends Bundle {
   val entries = Vec(2, UInt(AttributeLayout.indexBits.W))
@@ -121,9 +121,9 @@ final class NormalEntry extends Bundle {
 
 /** A tile of the plane map.
   *
-  * Mode 0: the whole tile lies in the plane `pointer`. Modes 1 and 2: two planes, for cells of a quarter or an eighth of
-  * the tile's edge; the heap word `pointer` holds their ids (0 in the low byte), the mask follows. Modes 3 and 4: four
-  * planes, for the same cells; two words of ids, then the mask. Modes 5 and 6: two and four planes, for cells of a
+  * Mode 0: the whole tile lies in the plane `pointer`. Modes 1 and 2: two planes, for cells of a quarter or an eighth
+  * of the tile's edge; the heap word `pointer` holds their ids (0 in the low byte), the mask follows. Modes 3 and 4:
+  * four planes, for the same cells; two words of ids, then the mask. Modes 5 and 6: two and four planes, for cells of a
   * sixteenth of the tile's edge.
   */
 final class PlaneDescriptor extends Bundle {

@@ -21,7 +21,8 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
   val rotation =
     Vec(3, Vec3(new Fixed(FixedPointFormat.signed(EnvironmentView.rotationBits, EnvironmentView.rotationFraction))))
 
-  /** Half a pixel of the frame, in the map's 1024 pixels: the centre of pixel (x, y) is at (2x + 1, 2y + 1) of these. */
+  /** Half a pixel of the frame, in the map's 1024 pixels: the centre of pixel (x, y) is at (2x + 1, 2y + 1) of these.
+    */
   val stepX = UInt((numbers.shadeBits + EnvironmentView.stepGuard).W)
   val stepY = UInt((numbers.shadeBits + EnvironmentView.stepGuard).W)
 
@@ -34,8 +35,8 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
   val enabled = Bool()
   val window  = new PixelRect(numbers.coordinateBits)
 
-  /** The environment hides the object where its point is nearer by more than the tolerance, in grid steps along the ray's
-    * dominant axis.
+  /** The environment hides the object where its point is nearer by more than the tolerance, in grid steps along the
+    * ray's dominant axis.
     */
   val occlusion          = Bool()
   val occlusionTolerance = UInt((numbers.gridBits - 2).W)

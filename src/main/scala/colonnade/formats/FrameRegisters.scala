@@ -114,7 +114,8 @@ final class SceneInDram extends Bundle {
   val page = UInt(SceneInDram.pageBits.W)
 }
 
-/** The layout of records in DRAM: lines of two, at a pitch of a power of two, so that no line crosses a page of 4 KB. */
+/** The layout of records in DRAM: lines of two, at a pitch of a power of two, so that no line crosses a page of 4 KB.
+  */
 object SceneLines {
   val records: Int = SceneCacheConfig.lineRecords
 
@@ -189,8 +190,8 @@ final class Errors(config: ColonnadeConfig) extends Bundle {
   val memory = config.columnBvhMemory.cache.map(_ => Bool())
 }
 
-/** Event counters of the last frame, summed over the array unless a field says otherwise. A new one comes last: the others
-  * keep their addresses.
+/** Event counters of the last frame, summed over the array unless a field says otherwise. A new one comes last: the
+  * others keep their addresses.
   */
 final class Counters(config: ColonnadeConfig) extends Bundle {
   private def counter            = UInt(Counters.bits(config).W)

@@ -56,8 +56,8 @@ final class FarPair(geometry: GeometryConfig) extends Bundle {
 }
 
 /** A direction as a point (u, v) of the unfolded octahedron |x| + |y| + |z| = 1023; the lowest number counts as the one
-  * above it. The lower half, z < 0, is folded outwards: (u, v) there is (1023 - |y|, 1023 - |x|), with the signs of x and
-  * y.
+  * above it. The lower half, z < 0, is folded outwards: (u, v) there is (1023 - |y|, 1023 - |x|), with the signs of x
+  * and y.
   */
 final class Octahedral[T <: Data](component: T) extends Bundle {
   val u = component.cloneType

@@ -5,8 +5,8 @@ import colonnade.axi.Axi
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Float32
 
-/** A ray of an application in memory: hits are those at tNear ≤ t ≤ tFar of origin + t · dir. Byte 0 is the lowest; a ray
-  * of a fan has the upper half alone. `driver/include/colonnade_rays.h` has the same formats in C.
+/** A ray of an application in memory: hits are those at tNear ≤ t ≤ tFar of origin + t · dir. Byte 0 is the lowest; a
+  * ray of a fan has the upper half alone. `driver/include/colonnade_rays.h` has the same formats in C.
   */
 final class RayRecord extends Bundle {
   val tFar   = new Float32
@@ -30,8 +30,9 @@ object HitRecord {
   val outOfRange: BigInt = miss - 1
 }
 
-/** Where the scene lies among an application's rays. The application's unit has mantissa · 2^(exponent − 24) vertex units,
-  * and `base` is its position of (0, 0, 0), in steps of 2^(−gridFraction − exponent − 3): docs/numbers.md, section 9.
+/** Where the scene lies among an application's rays. The application's unit has mantissa · 2^(exponent − 24) vertex
+  * units, and `base` is its position of (0, 0, 0), in steps of 2^(−gridFraction − exponent − 3): docs/numbers.md,
+  * section 9.
   */
 final class RayPlacement extends Bundle {
   val mantissa = UInt(Float32.mantissaBits.W)
@@ -47,8 +48,8 @@ object RayPlacement {
   val fractionBits: Int = 3
 }
 
-/** What makes the rays of a sensor, 64 bytes. The direction at a column and row is the float nearest to (corner + column ·
-  * right + row · down) · 2^−30, of sums modulo 2^32.
+/** What makes the rays of a sensor, 64 bytes. The direction at a column and row is the float nearest to (corner +
+  * column · right + row · down) · 2^−30, of sums modulo 2^32.
   */
 final class RaySensor extends Bundle {
   val reserved = UInt(192.W)

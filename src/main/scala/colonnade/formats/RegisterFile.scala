@@ -11,7 +11,8 @@ final class RegisterPort(addressBits: Int) extends Bundle {
   val address   = Input(UInt(addressBits.W)) // word address
   val writeData = Input(UInt(RegisterMap.dataBits.W))
 
-  /** Result of the last read, from one cycle after it until the next read. Unused bits and unknown addresses read as 0. */
+  /** Result of the last read, from one cycle after it until the next read. Unused bits and unknown addresses read as 0.
+    */
   val readData = Output(UInt(RegisterMap.dataBits.W))
 }
 
@@ -32,10 +33,11 @@ final class RegisterFileIO[S <: Bundle with SceneRegisters, D <: Bundle with Bus
   val commands = Option.when(config.frame.rays)(Output(new RayCommands))
 }
 
-/** The registers of the host, at the addresses of [[RegisterMap]]. Settings above their limit are clamped for the device.
+/** The registers of the host, at the addresses of [[RegisterMap]]. Settings above their limit are clamped for the
+  * device.
   *
-  * Writes are ignored while the device is busy, so the settings of a frame are constant. A read takes one cycle. The words
-  * of a wide number are read one by one, so it is consistent only while the device is idle.
+  * Writes are ignored while the device is busy, so the settings of a frame are constant. A read takes one cycle. The
+  * words of a wide number are read one by one, so it is consistent only while the device is idle.
   *
   * @param settings registers that the host writes
   * @param status   registers that the host reads

@@ -33,8 +33,8 @@ final case class Register(
 /** Addresses of all registers. Each number starts at its own word.
   *
   * A kind of register has a block at a fixed address. Commands, status, errors and counters have the same addresses in
-  * every design, whichever of them it has: a new one is declared last, and moves no other. Words without a register read
-  * as 0.
+  * every design, whichever of them it has: a new one is declared last, and moves no other. Words without a register
+  * read as 0.
   */
 object RegisterMap {
   val dataBits: Int = 32 // of a word
@@ -117,8 +117,8 @@ object RegisterMap {
   private def words(number: Field): Int = (number.width + dataBits - 1) / dataBits
 }
 
-/** The maximum legal value of each register that can hold larger ones. The host reads back what it wrote; the device uses
-  * the limit instead of larger values. Other registers may have any value; docs/errors.md.
+/** The maximum legal value of each register that can hold larger ones. The host reads back what it wrote; the device
+  * uses the limit instead of larger values. Other registers may have any value; docs/errors.md.
   */
 object RegisterLimits {
 

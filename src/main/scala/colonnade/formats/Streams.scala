@@ -39,7 +39,8 @@ object LoadTarget {
   def columnBvh(config: ColonnadeConfig): UInt = 0.U(bits(config).W)
 }
 
-/** A write to the device's memories: to the record memories of all columns, or to a memory of the environment's maps. */
+/** A write to the device's memories: to the record memories of all columns, or to a memory of the environment's maps.
+  */
 final class Load(config: ColonnadeConfig) extends Bundle {
   private val formats = new RecordFormats(config)
 
@@ -52,7 +53,9 @@ final class Load(config: ColonnadeConfig) extends Bundle {
   val record = formats.record // a word of another memory is in the low bits
 }
 
-/** A read request of a traversal unit or of the attribute fetch to its column. It may be withdrawn until it is accepted. */
+/** A read request of a traversal unit or of the attribute fetch to its column. It may be withdrawn until it is
+  * accepted.
+  */
 final class RecordRequest(config: ColonnadeConfig) extends Bundle {
   val address = UInt(RecordFormats.addressBits(config).W)
 }

@@ -4,8 +4,8 @@ import chisel3._
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
-/** A point light. `colour` is its intensity at the squared distance `reachMantissa · 2^reachExponent`, in grid steps; the
-  * intensity falls with the squared distance. A mantissa of 0 disables falloff.
+/** A point light. `colour` is its intensity at the squared distance `reachMantissa · 2^reachExponent`, in grid steps;
+  * the intensity falls with the squared distance. A mantissa of 0 disables falloff.
   */
 final class Light(numbers: NumberFormats) extends Bundle {
   val position      = Vec3(SInt(numbers.macBits.W))
@@ -87,7 +87,9 @@ object MaterialKind {
   def isSpecular(kind: UInt): Bool = kind === mirror || kind === glass
 }
 
-/** The spread of the reflections of rough metal: docs/gather.md. Mirrors and glass have `alpha` alone, 0 if they are smooth. */
+/** The spread of the reflections of rough metal: docs/gather.md. Mirrors and glass have `alpha` alone, 0 if they are
+  * smooth.
+  */
 final class Lobe extends Bundle {
   val alpha = UInt(Lobe.alphaBits.W) // the square of the roughness; of mirrors and glass times four
   val slope = UInt(Lobe.slopeBits.W) // how fast it falls with the distance from its axis
@@ -138,8 +140,8 @@ final class Material(config: ColonnadeConfig) extends Bundle {
   /** See [[MaterialKind]]. */
   val kind = ifBounces(UInt(MaterialKind.bits.W))
 
-  /** Glass: the refractive index on the incident side divided by that on the other side, for a ray that hits the front or
-    * the back of a triangle.
+  /** Glass: the refractive index on the incident side divided by that on the other side, for a ray that hits the front
+    * or the back of a triangle.
     */
   val etaFront = ifBounces(eta)
   val etaBack  = ifBounces(eta)

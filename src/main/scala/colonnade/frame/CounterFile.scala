@@ -29,8 +29,8 @@ final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
 
 /** The counters and sticky errors of the array, over the cycles of `isCounting`.
   *
-  * They are complete [[CounterFile.settleCycles]] cycles after the last counted one. Sums pass one register in each column
-  * and one here, so no path both crosses the array and adds.
+  * They are complete [[CounterFile.settleCycles]] cycles after the last counted one. Sums pass one register in each
+  * column and one here, so no path both crosses the array and adds.
   */
 final class CounterFile(config: ColonnadeConfig) extends Module {
   import CounterFile._

@@ -52,12 +52,12 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
 /** Runs frames: dispatches tiles of all kinds in parallel, waits for the last pixel, and ends the
   * frame when the device is idle.
   *
-  * The first tile comes four cycles after the start. `done` follows the last pixel by [[FrameController.settleCycles]] or
-  * more, so that counters and errors are complete. A frame without pixels ends at once. The watchdog aborts a frame in
-  * which no pixel leaves for `watchdogCycles`, not counting stalls of the sink; the frame then ends with an error.
+  * The first tile comes four cycles after the start. `done` follows the last pixel by [[FrameController.settleCycles]]
+  * or more, so that counters and errors are complete. A frame without pixels ends at once. The watchdog aborts a frame
+  * in which no pixel leaves for `watchdogCycles`, not counting stalls of the sink; the frame then ends with an error.
   *
-  * After an abort the frame waits for reads in flight, for `watchdogCycles` at most: a memory that never answers does not
-  * hang the device. The next frame waits for these reads under the same limit.
+  * After an abort the frame waits for reads in flight, for `watchdogCycles` at most: a memory that never answers does
+  * not hang the device. The next frame waits for these reads under the same limit.
   */
 final class FrameController(config: ColonnadeConfig) extends Module {
   import FrameController._

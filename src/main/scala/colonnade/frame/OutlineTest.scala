@@ -21,7 +21,8 @@ final class TestedTile(config: ColonnadeConfig) extends TestedSquare(config) {
   val edgeValues = EdgeValues(config)
 }
 
-/** The edge functions of the object's outline, x·`x` + y·`y` + `offset`, at the corner of a tile where each one is highest.
+/** The edge functions of the object's outline, x·`x` + y·`y` + `offset`, at the corner of a tile where each one is
+  * highest.
   *
   * They are not below 0, since the tile meets the object. They saturate above what one can fall by within the tile.
   */
@@ -56,8 +57,9 @@ final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())                                // no tile is inside
 }
 
-/** Tests tiles against the object's rectangle and outline. A tile meets the object unless it is outside the rectangle or
-  * wholly outside the half-plane of one edge. Path tracers get the tiles that meet the object or the environment's window.
+/** Tests tiles against the object's rectangle and outline. A tile meets the object unless it is outside the rectangle
+  * or wholly outside the half-plane of one edge. Path tracers get the tiles that meet the object or the environment's
+  * window.
   *
   * Throughput: one tile per cycle, in order. Latency: two cycles, for products and their sums.
   */
@@ -106,8 +108,8 @@ final class PixelTestIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool()) // no pixel is inside
 }
 
-/** Tests pixels of tiles that meet the object, like [[OutlineTest]]: exactly, but from the edge functions of the tile, so
-  * that each product has as many digits as a position in the tile.
+/** Tests pixels of tiles that meet the object, like [[OutlineTest]]: exactly, but from the edge functions of the tile,
+  * so that each product has as many digits as a position in the tile.
   *
   * Throughput: one pixel per cycle, in order. Latency: two cycles, for sums of products and comparisons.
   */
@@ -135,8 +137,8 @@ final class PixelTest(config: ColonnadeConfig) extends Module {
   io.tested.bits.meetsObject := RegEnable(isInRect && isInside, stages.second)
   io.tested.bits.isForUnits  := RegEnable((isInRect && isInside) || isInWindow, stages.second)
 
-  /** A rising edge function is highest at the last position, another one at the first. The magnitude of a negative normal
-    * is its complement and 1.
+  /** A rising edge function is highest at the last position, another one at the first. The magnitude of a negative
+    * normal is its complement and 1.
     */
   private def fall(normal: SInt, position: UInt): UInt = {
     val isNegative = normal < 0.S

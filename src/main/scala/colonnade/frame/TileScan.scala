@@ -63,8 +63,8 @@ final class TileScanIO(config: ColonnadeConfig) extends Bundle {
 
 /** The pixels of a tile, clipped at the frame's edge, in Morton order.
   *
-  * Throughput: one pixel per cycle. The next tile is accepted with the last pixel of the current one, so tiles follow each
-  * other without a gap.
+  * Throughput: one pixel per cycle. The next tile is accepted with the last pixel of the current one, so tiles follow
+  * each other without a gap.
   */
 final class TileScan(config: ColonnadeConfig) extends Module {
   val io = IO(new TileScanIO(config))
@@ -110,9 +110,9 @@ final class MortonScanIO(levels: Int) extends Bundle {
 
 /** Scans the cells of a grid in Morton order, so that consecutive cells are close to each other.
   *
-  * Throughput: one cell per cycle, the first one in the cycle after the grid is accepted. The next grid is accepted with
-  * the last step of the current one. Codes outside the grid are skipped in whole blocks, at most three per level between
-  * two cells. An empty grid gives no cell.
+  * Throughput: one cell per cycle, the first one in the cycle after the grid is accepted. The next grid is accepted
+  * with the last step of the current one. Codes outside the grid are skipped in whole blocks, at most three per level
+  * between two cells. An empty grid gives no cell.
   */
 final class MortonScan(levels: Int) extends Module {
   val io = IO(new MortonScanIO(levels))

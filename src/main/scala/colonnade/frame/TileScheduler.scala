@@ -17,12 +17,12 @@ final class TileSchedulerIO(config: ColonnadeConfig, kind: TileKind.Value) exten
   val isIdle = Output(Bool()) // no tile is left
 }
 
-/** Dispatches the tiles of a frame that are of one kind, in Morton order, to ready columns, round-robin. A [[TileDivider]]
-  * may divide the object's tiles.
+/** Dispatches the tiles of a frame that are of one kind, in Morton order, to ready columns, round-robin. A
+  * [[TileDivider]] may divide the object's tiles.
   *
-  * Throughput: one tile per cycle while the queue holds tiles; the first one comes four cycles after the start. The queue
-  * hides the cycles in which codes outside the frame are skipped: a column needs more cycles per tile than a skip takes.
-  * A tile of another kind takes one cycle.
+  * Throughput: one tile per cycle while the queue holds tiles; the first one comes four cycles after the start. The
+  * queue hides the cycles in which codes outside the frame are skipped: a column needs more cycles per tile than a skip
+  * takes. A tile of another kind takes one cycle.
   */
 final class TileScheduler(config: ColonnadeConfig, kind: TileKind.Value) extends Module {
   import TileScheduler._
@@ -97,8 +97,8 @@ final class TileDividerIO(config: ColonnadeConfig) extends Bundle {
   val parts   = Decoupled(new ObjectTile(config))
 }
 
-/** Divides a tile into squares of [[TileDivider.edge]], in Morton order, without those outside the frame. So work that is
-  * much in few tiles is shared by more columns.
+/** Divides a tile into squares of [[TileDivider.edge]], in Morton order, without those outside the frame. So work that
+  * is much in few tiles is shared by more columns.
   *
   * Throughput: a square per cycle. Combinational.
   */

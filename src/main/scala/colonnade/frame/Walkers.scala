@@ -26,8 +26,9 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   * the others go to the background walker. With an environment a [[PixelMixer]] mixes them with pixels of another tile.
   *
   * Throughput: one pixel per cycle, the first one five cycles after its tile is accepted. Of the others
-  * [[TileWalker.maxOthers]] wait in a queue, so that they do not hold up those behind them. The next tile is accepted when
-  * only the queues and two more pixels are left, so tiles follow each other without a gap, and no column takes tiles early.
+  * [[TileWalker.maxOthers]] wait in a queue, so that they do not hold up those behind them. The next tile is accepted
+  * when only the queues and two more pixels are left, so tiles follow each other without a gap, and no column takes
+  * tiles early.
   */
 final class TileWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new TileWalkerIO(config))
@@ -75,7 +76,9 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
 object TileWalker {
   val maxOthers: Int = 64 // pixels outside the object that wait for the background walker
 
-  /** Pixels of a tile of the environment that are in flight at most: one enters in four cycles, and leaves after about 300. */
+  /** Pixels of a tile of the environment that are in flight at most: one enters in four cycles, and leaves after about
+    * 300.
+    */
   def maxEnvironment(config: ColonnadeConfig): Int = (config.units.pathContexts / 2).max(1)
 }
 
@@ -94,8 +97,8 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool()) // no pixel of a tile is left
 }
 
-/** Colours the pixels that show the background, in parallel with the path tracer: all pixels of its own tiles, and those
-  * that the column's [[TileWalker]] and [[EnvironmentWalker]] reject. Throughput: one pixel per cycle of either.
+/** Colours the pixels that show the background, in parallel with the path tracer: all pixels of its own tiles, and
+  * those that the column's [[TileWalker]] and [[EnvironmentWalker]] reject. Throughput: one pixel per cycle of either.
   */
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new BackgroundWalkerIO(config))

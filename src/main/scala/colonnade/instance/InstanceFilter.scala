@@ -27,8 +27,8 @@ final class InstanceFilterIO(config: PathConfig) extends Bundle {
   val entered = Decoupled(new EnteredBoxes(config))
 }
 
-/** Finds the instances whose boxes a ray may enter, four a cycle, with positions in cells and slopes of 6 bits: never fewer
-  * than in exact arithmetic. Latency: four cycles for up to four instances. Source: docs/numbers.md, section 10.
+/** Finds the instances whose boxes a ray may enter, four a cycle, with positions in cells and slopes of 6 bits: never
+  * fewer than in exact arithmetic. Latency: four cycles for up to four instances. Source: docs/numbers.md, section 10.
   */
 final class InstanceFilter(config: PathConfig) extends Module {
   import InstanceFilter._

@@ -49,15 +49,16 @@ final class InstanceTransformIO(config: PathConfig) extends Bundle {
   val ray = Decoupled(new ObjectRay(config))
 }
 
-/** Transforms a ray every three cycles to the axes of an object: a row of the matrix a cycle, with origin and direction.
-  * Latency: 13 cycles. Source: docs/numbers.md, section 10.
+/** Transforms a ray every three cycles to the axes of an object: a row of the matrix a cycle, with origin and
+  * direction. Latency: 13 cycles. Source: docs/numbers.md, section 10.
   */
 final class InstanceTransform(config: PathConfig) extends Module {
   private val numbers = config.numbers
 
   val io = IO(new InstanceTransformIO(config))
 
-  // Five stages of three cycles. All hold while a ray, which is offered in the first cycle of the last one, is not taken
+  // Five stages of three cycles. All hold while a ray, which is offered in the first cycle of the last one, is not
+  // taken
   private val phase   = RegInit(0.U(2.W))
   private val holds   = RegInit(VecInit.fill(5)(false.B))
   private val moves   = !io.ray.valid || io.ray.ready
@@ -75,8 +76,8 @@ final class InstanceTransform(config: PathConfig) extends Module {
   private def staged[T <: Data](value:  T): T = RegEnable(value, moves && isLast)
   private def early[T <: Data](value:   T): T = RegEnable(value, moves && isNext)
 
-  // The operands, in the ray's own frame, as a visit comes. Products and sums of three, by row of the matrix, reach into
-  // stage 1. Along the dominant axis the direction is 1 or -1
+  // The operands, in the ray's own frame, as a visit comes. Products and sums of three, by row of the matrix, reach
+  // into stage 1. Along the dominant axis the direction is 1 or -1
   private val visit      = io.visit.bits
   private val info0      = staged(VisitInfo(visit))
   private val axis0      = staged(visit.ray.orientation.axis)

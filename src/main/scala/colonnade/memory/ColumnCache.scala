@@ -22,10 +22,10 @@ final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
 
 /** One bank of a column's cache; docs/scene-cache.md has a table of its cycles.
   *
-  * A request that misses is answered "later", and its line is entered among the awaited ones, once. So hits pass misses. A
-  * record follows a "later" for certain: the line is awaited before the answer, until it is announced. While records of a
-  * line arrive, no request is accepted: they use the same memory and the same broadcast. With parity, a record with a wrong
-  * one becomes zeros: a node without children, or a leaf without triangles.
+  * A request that misses is answered "later", and its line is entered among the awaited ones, once. So hits pass
+  * misses. A record follows a "later" for certain: the line is awaited before the answer, until it is announced. While
+  * records of a line arrive, no request is accepted: they use the same memory and the same broadcast. With parity, a
+  * record with a wrong one becomes zeros: a node without children, or a leaf without triangles.
   */
 final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val cache    = config.columnBvhMemory.cache.get

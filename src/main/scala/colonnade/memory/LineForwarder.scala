@@ -22,8 +22,9 @@ final class LineForwarderIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** In the place of a [[SharedCache]] without lines: passes one bank's lines from DRAM to the columns; docs/scene-cache.md.
-  * Beats are gathered in a memory of two lines, whose rows are records: nothing is as wide as a line.
+/** In the place of a [[SharedCache]] without lines: passes one bank's lines from DRAM to the columns;
+  * docs/scene-cache.md. Beats are gathered in a memory of two lines, whose rows are records: nothing is as wide as a
+  * line.
   */
 final class LineForwarder(config: ColonnadeConfig) extends Module {
   private val cache    = config.columnBvhMemory.cache.get
@@ -86,8 +87,8 @@ final class LineForwarder(config: ColonnadeConfig) extends Module {
   assert(step =/= 1.U || awaited.io.deq.valid, "a line that was not read")
 }
 
-/** A line is two consecutive records. Lines 2n and 2n + 1, *buddies*, lie in bank n mod `banks`, as numbers 2 · (n / `banks`)
-  * and the next one of that bank.
+/** A line is two consecutive records. Lines 2n and 2n + 1, *buddies*, lie in bank n mod `banks`, as numbers 2 · (n /
+  * `banks`) and the next one of that bank.
   */
 object Lines {
   val records:  Int = SceneLines.records
@@ -107,7 +108,9 @@ object Lines {
   /** Whether records have a parity bit from the DRAM port to their requesters. */
   def hasParity(config: ColonnadeConfig): Boolean = config.columnBvhMemory.cache.exists(_.parity)
 
-  /** A record in a cache or on a bus: its parity is the most significant bit, if it has one. Zeros have the right parity. */
+  /** A record in a cache or on a bus: its parity is the most significant bit, if it has one. Zeros have the right
+    * parity.
+    */
   def stored(config: ColonnadeConfig): UInt =
     UInt((new RecordFormats(config).recordBits + (if (hasParity(config)) 1 else 0)).W)
 

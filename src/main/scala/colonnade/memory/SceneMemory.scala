@@ -29,8 +29,8 @@ final class SceneMemoryEvents(config: ColonnadeConfig) extends Bundle {
   val error     = Bool()
 }
 
-/** The shared cache, or a [[LineForwarder]] without one, and the DRAM port. A reset of the columns does not reset it: reads
-  * that are in flight end, and a column ignores lines that it does not await.
+/** The shared cache, or a [[LineForwarder]] without one, and the DRAM port. A reset of the columns does not reset it:
+  * reads that are in flight end, and a column ignores lines that it does not await.
   */
 final class SceneMemory(config: ColonnadeConfig) extends Module {
   val io = IO(new SceneMemoryIO(config))

@@ -29,14 +29,12 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** One bank of the cache that all columns share, behind the same bank of every [[ColumnCache]]: docs/scene-cache.md. {{{
-  * cycle    d−1     d                     d+1                d+2             d+4, d+5
-  * request  accept  tags, awaited lines   announced          line read       records on the bus
-  * line             victim                announced, taken   line written    records on the bus
-  * }}}
-  * While less than half of the entries of lines to read are used, a missing line's buddy is also read, unless it is
-  * held. Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
-  * again.
+/** One bank of the cache that all columns share, behind the same bank of every [[ColumnCache]]: docs/scene-cache.md.
+  * {{{ cycle    d−1     d                     d+1                d+2             d+4, d+5 request  accept  tags,
+  * awaited lines   announced          line read       records on the bus line             victim
+  * announced, taken   line written    records on the bus }}} While less than half of the entries of lines to read are
+  * used, a missing line's buddy is also read, unless it is held. Reads from DRAM are announced in their order. They
+  * precede requests that hit, which keep their place and are looked up again.
   */
 final class SharedCache(config: ColonnadeConfig) extends Module {
   private val cache    = config.columnBvhMemory.cache.get
@@ -75,7 +73,8 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   private val fills     = comes && (filled.buses & ~free) === 0.U
   private val usable    = free & ~Mux(comes, filled.buses, 0.U)
 
-  // Cycle d − 1: accept a request when the last one leaves and its own bus will be free; one that stays is looked up again
+  // Cycle d − 1: accept a request when the last one leaves and its own bus will be free; one that stays is looked up
+  // again
   private val arbiter    = Module(new RoundRobin(config.array.columns))
   private val isWaiting  = RegInit(false.B) // a request is being looked up
   private val leaves     = Wire(Bool())

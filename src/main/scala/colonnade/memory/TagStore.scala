@@ -3,13 +3,15 @@ package colonnade.memory
 import chisel3._
 import chisel3.util.{log2Ceil, Fill, PriorityEncoder, UIntToOH, Valid}
 
-/** Which lines one bank of a cache holds, and where: a memory of tags with a single port, valid bits and the replacement.
+/** Which lines one bank of a cache holds, and where: a memory of tags with a single port, valid bits and the
+  * replacement.
   *
   * @param sets     sets of the bank, a power of two
   * @param ways     ways of a set
   * @param lineBits width of the number of a line
   * @param inMemory
-  *   valid bits and the replacement lie in memories, with a flag for each set that it was written; tags are read before a
+  *   valid bits and the replacement lie in memories, with a flag for each set that it was written; tags are read before
+  * a
   *   register, not behind one
   */
 private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, inMemory: Boolean) {
@@ -24,8 +26,8 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, inMemo
   private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U((if (inMemory) 1 else ways).W))))
   private val validMemory = Option.when(inMemory)(Mem(sets, UInt(ways.W)))
 
-  /** The valid bits of a set are read with its tags, or in the next cycle from the memory: no set changes in the cycle in
-    * which its tags are read.
+  /** The valid bits of a set are read with its tags, or in the next cycle from the memory: no set changes in the cycle
+    * in which its tags are read.
     */
   private val foundValid = Option.unless(inMemory)(Wire(UInt(ways.W)))
 

@@ -6,9 +6,9 @@ import scala.collection.mutable
 
 /** A microprogram: a sequence of steps that drive a datapath, one step a cycle unless a step jumps or repeats.
   *
-  * Steps are described in order and become hardware in [[build]], within the module that calls it. A step sets registers,
-  * raises control signals, chooses operands, and has at most one [[branch]]. The program's [[graph]] is drawn from the
-  * same description.
+  * Steps are described in order and become hardware in [[build]], within the module that calls it. A step sets
+  * registers, raises control signals, chooses operands, and has at most one [[branch]]. The program's [[graph]] is
+  * drawn from the same description.
   *
   * {{{
   * program.step(Idle)(program.await(start, "start"))
@@ -58,7 +58,8 @@ final class Microprogram[L <: Label](encoding: StepEncoding) {
     labels(label) = step
   }
 
-  /** Adds steps in which several operations overlap: each part is described for its cycle, counted from the first step. */
+  /** Adds steps in which several operations overlap: each part is described for its cycle, counted from the first step.
+    */
   def overlap(describe: Overlap[L] => Unit): Unit = {
     val parts = new Overlap[L]
     describe(parts)
@@ -81,8 +82,8 @@ final class Microprogram[L <: Label](encoding: StepEncoding) {
     steps(condition) = steps.getOrElse(condition, Set.empty[Int]) + index
   }
 
-  /** In a step: asserts a control signal that comes from a register of its own, decoded from the next step. For signals at
-    * the start of the slowest paths.
+  /** In a step: asserts a control signal that comes from a register of its own, decoded from the next step. For signals
+    * at the start of the slowest paths.
     */
   def raiseEarly(signal: Bool): Unit = early(signal) = early.getOrElse(signal, Set.empty) + index
 
@@ -149,7 +150,8 @@ final class Microprogram[L <: Label](encoding: StepEncoding) {
 
   private def built: StepRegister = state.getOrElse(throw new IllegalStateException("before the program is built"))
 
-  /** The state graph in Graphviz's DOT, once the program is built. A node is a label and the steps up to the next one. */
+  /** The state graph in Graphviz's DOT, once the program is built. A node is a label and the steps up to the next one.
+    */
   def graph(name: String): String = ProgramGraph.draw(name, bodies.size, labels.toSeq, branches.toMap)
 
   private def positionOf(label: L): Int = labels.getOrElse(label, throw new NoSuchElementException(s"no step $label"))
@@ -174,8 +176,8 @@ final class Microprogram[L <: Label](encoding: StepEncoding) {
   }
 }
 
-/** A step that a program can jump to. A program's labels are the case objects of one sealed trait, so a jump into another
-  * program does not compile.
+/** A step that a program can jump to. A program's labels are the case objects of one sealed trait, so a jump into
+  * another program does not compile.
   */
 trait Label {
 

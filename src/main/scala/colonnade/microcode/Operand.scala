@@ -5,8 +5,8 @@ import chisel3.util.Mux1H
 
 import scala.collection.mutable
 
-/** An operand of a datapath unit, for which different steps choose different values. Each value has one select register,
-  * shared by all steps that choose it.
+/** An operand of a datapath unit, for which different steps choose different values. Each value has one select
+  * register, shared by all steps that choose it.
   */
 final class Operand(program: Microprogram[_], width: Int) {
   private val choices = mutable.LinkedHashMap.empty[SInt, Set[Int]]

@@ -18,8 +18,8 @@ final class DividerIO(mantissaBits: Int, digits: Int) extends Bundle {
   val quotient = Decoupled(UInt((digits + 1).W)) // ⌊numerator · 2^digits / denominator⌋
 }
 
-/** Divides mantissas by restoring digit recurrence in radix 4. Three parallel subtractors try one, two and three times the
-  * denominator; the largest multiple that fits gives two quotient bits.
+/** Divides mantissas by restoring digit recurrence in radix 4. Three parallel subtractors try one, two and three times
+  * the denominator; the largest multiple that fits gives two quotient bits.
   *
   * Latency ⌈(digits + 1) / (2 · digitsPerCycle)⌉ + 1 cycles, one division at a time. The next division can enter in the
   * cycle in which a quotient leaves. The quotient is meaningless if the denominator's top bit is clear.
@@ -102,8 +102,8 @@ final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int, hasRe
 /** Divides mantissas as [[Divider]] does, a division a cycle in each lane. The lanes share the denominator.
   *
   * Restoring recurrence in radix 2, two quotient bits a stage: two subtractors in series are a third smaller than the
-  * three parallel ones of radix 4, and fit the cycle. Latency: ⌈(digits + 1) / bitsPerStage⌉ loads. A stage that does not
-  * load holds its values.
+  * three parallel ones of radix 4, and fit the cycle. Latency: ⌈(digits + 1) / bitsPerStage⌉ loads. A stage that does
+  * not load holds its values.
   *
   * @param digits fraction bits of the quotient
   * @param lanes  numerators that are divided by the same denominator
@@ -165,8 +165,8 @@ final class FoldedDividerIO(numeratorBits: Int, denominatorBits: Int, digits: In
   * n = numerator / 2^numeratorBits and d = denominator / 2^denominatorBits. The denominator's top bit is set; the
   * numerator is less than twice the denominator in this sense.
   *
-  * Restoring, three bits a cycle. A chain of stages, each of which works on a division for one interval. The quotient comes
-  * `FoldedDivider.intervals` intervals after its operands and one cycle.
+  * Restoring, three bits a cycle. A chain of stages, each of which works on a division for one interval. The quotient
+  * comes `FoldedDivider.intervals` intervals after its operands and one cycle.
   */
 final class FoldedDivider(numeratorBits: Int, denominatorBits: Int, digits: Int, interval: Int) extends Module {
   val io = IO(new FoldedDividerIO(numeratorBits, denominatorBits, digits))

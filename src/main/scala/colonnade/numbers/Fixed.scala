@@ -35,8 +35,9 @@ object FixedPointFormat {
   def unsigned(width: Int, fraction: Int): FixedPointFormat = FixedPointFormat(width, fraction, signed = false)
 }
 
-/** A hardware number with its format. Its only field is named after the format, so connecting two different formats fails
-  * at elaboration. Sums, differences and products are exact, in the format that holds them; only [[Rounding]] drops bits.
+/** A hardware number with its format. Its only field is named after the format, so connecting two different formats
+  * fails at elaboration. Sums, differences and products are exact, in the format that holds them; only [[Rounding]]
+  * drops bits.
   */
 final class Fixed(val format: FixedPointFormat) extends Record {
 

@@ -34,7 +34,9 @@ object Normalise {
     result
   }
 
-  /** Numbers of one width, shifted together until the largest fills `bits` and a sign, and floored; all are 0 if they are. */
+  /** Numbers of one width, shifted together until the largest fills `bits` and a sign, and floored; all are 0 if they
+    * are.
+    */
   def together(numbers: Seq[SInt], bits: Int): Seq[SInt] = {
     val width   = numbers.head.getWidth.max(bits + 1)
     val padded  = numbers.map(_.pad(width))
@@ -78,8 +80,8 @@ object Normalise {
   }
 }
 
-/** Scales vectors to the length of a stored normal, `one`: a table has the reciprocals of 128 lengths. A vector is then at
-  * most `one` long and less than 1 % shorter, before its components are rounded.
+/** Scales vectors to the length of a stored normal, `one`: a table has the reciprocals of 128 lengths. A vector is then
+  * at most `one` long and less than 1 % shorter, before its components are rounded.
   */
 object UnitLength {
   val factorBits: Int = 10

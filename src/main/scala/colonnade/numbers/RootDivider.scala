@@ -21,11 +21,11 @@ final class RootDividerIO(radicandBits: Int, mantissaBits: Int, digits: Int) ext
   val result = Decoupled(UInt(RootDivider.resultBits(radicandBits, digits).W))
 }
 
-/** Square root and division with one subtractor, by restoring digit recurrence: one bit a cycle. It has half the area of a
-  * [[SquareRoot]] and a [[Divider]].
+/** Square root and division with one subtractor, by restoring digit recurrence: one bit a cycle. It has half the area
+  * of a [[SquareRoot]] and a [[Divider]].
   *
-  * Latency rootBits + 1 or digits + 2 cycles, one operation at a time. The next operation can enter in the cycle in which
-  * a result leaves.
+  * Latency rootBits + 1 or digits + 2 cycles, one operation at a time. The next operation can enter in the cycle in
+  * which a result leaves.
   */
 final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) extends Module {
   require(radicandBits >= 2 && radicandBits % 2 == 0, s"a square root of $radicandBits bits; they must be even")

@@ -66,9 +66,9 @@ final class FoldedSquareRootIO(radicandBits: Int) extends Bundle {
 
 /** Square roots, one every `interval` cycles, of radicands with an even number of bits.
   *
-  * Restoring, three bits of the root a cycle. A chain of stages, each of which works on a root for one interval; the first
-  * ones have short remainders and roots. The root comes `FoldedSquareRoot.intervals` intervals after its radicand and one
-  * cycle.
+  * Restoring, three bits of the root a cycle. A chain of stages, each of which works on a root for one interval; the
+  * first ones have short remainders and roots. The root comes `FoldedSquareRoot.intervals` intervals after its radicand
+  * and one cycle.
   */
 final class FoldedSquareRoot(radicandBits: Int, interval: Int) extends Module {
   require(radicandBits % 2 == 0, s"a square root of $radicandBits bits; they must be even")

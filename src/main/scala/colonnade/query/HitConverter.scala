@@ -27,8 +27,8 @@ final class HitConverterIO(config: PathConfig) extends Bundle {
   val isIdle    = Output(Bool())
 }
 
-/** Converts hits to an application's numbers: docs/numbers.md, section 9, rule 6. In order; a hit takes three cycles, for
-  * the quotients t, u and v, a range one. All stages move together, while no record waits.
+/** Converts hits to an application's numbers: docs/numbers.md, section 9, rule 6. In order; a hit takes three cycles,
+  * for the quotients t, u and v, a range one. All stages move together, while no record waits.
   */
 final class HitConverter(config: PathConfig) extends Module {
   import HitConverter._

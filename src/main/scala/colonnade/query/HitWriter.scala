@@ -24,8 +24,8 @@ final class HitWriterIO extends Bundle {
   val isIdle  = Output(Bool())
 }
 
-/** Writes the hits of runs, in order, by bursts of whole beats; the first and last beat of consecutive hits may be partial.
-  * The beats of a burst are complete before its address goes out, so that the port never waits for them.
+/** Writes the hits of runs, in order, by bursts of whole beats; the first and last beat of consecutive hits may be
+  * partial. The beats of a burst are complete before its address goes out, so that the port never waits for them.
   */
 final class HitWriter extends Module {
   val io = IO(new HitWriterIO)

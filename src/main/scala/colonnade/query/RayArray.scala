@@ -107,8 +107,8 @@ final class RayPortIO(count: Int) extends Bundle {
   val write  = new AxiWritePort(RayPort.idBits(count), RayBatch.bytes)
 }
 
-/** One port for some masters, by round-robin; a master's number is its id, so responses of different ones may overtake each
-  * other. The beats of a write follow its address before the next address is taken.
+/** One port for some masters, by round-robin; a master's number is its id, so responses of different ones may overtake
+  * each other. The beats of a write follow its address before the next address is taken.
   */
 final class RayPort(count: Int) extends Module {
   val io = IO(new RayPortIO(count))

@@ -81,8 +81,8 @@ final class LimitStageIO(config: PathConfig) extends Bundle {
 
 /** Converts a ray's limits to grid steps: docs/numbers.md, section 9, rule 4.
   *
-  * One multiplier takes the halves of two products of 72 bits, one shifter drops their fractions. Throughput: a ray every
-  * [[PositionStage.interval]] cycles; latency: 8 cycles. All steps stand still while a result is not taken.
+  * One multiplier takes the halves of two products of 72 bits, one shifter drops their fractions. Throughput: a ray
+  * every [[PositionStage.interval]] cycles; latency: 8 cycles. All steps stand still while a result is not taken.
   */
 final class LimitStage(config: PathConfig) extends Module {
   val io = IO(new LimitStageIO(config))

@@ -33,8 +33,8 @@ final class RayQueriesIO(config: PathConfig) extends Bundle {
   val refuses = Output(Bool())
 }
 
-/** Traces runs of rays: docs/rays.md, hardware. A ray has a context, whose tables hold what is known of it: the next one of
-  * a ring, so that the hits of rays, which end in any order, are read in the order of rays.
+/** Traces runs of rays: docs/rays.md, hardware. A ray has a context, whose tables hold what is known of it: the next
+  * one of a ring, so that the hits of rays, which end in any order, are read in the order of rays.
   *
   * A result is always accepted; a ray waits for a traversal unit, which waits for nothing here. So each ray ends.
   */

@@ -39,8 +39,8 @@ final class RayRingIO(config: PathConfig) extends Bundle {
   val rays = Decoupled(new EndedRay)
 }
 
-/** Contexts in the order of rays, which end in any order. A ray takes the next context of the ring, and gives it back when
-  * it is the oldest one, has ended, and is taken; rays of a run are offered when each of them has a context.
+/** Contexts in the order of rays, which end in any order. A ray takes the next context of the ring, and gives it back
+  * when it is the oldest one, has ended, and is taken; rays of a run are offered when each of them has a context.
   *
   * Throughput: a ray a cycle, and a cycle between runs. A ray that is not taken is read again.
   */

@@ -66,12 +66,13 @@ final class EntryControlIO(slices: Int) extends Bundle {
   val busy    = Output(Bool())
 }
 
-/** Sequences [[RayEntry]]: three steps for the dominant axis, a wait for the quotients, then both sides, then the advance.
+/** Sequences [[RayEntry]]: three steps for the dominant axis, a wait for the quotients, then both sides, then the
+  * advance.
   *
-  * The sides are pipelined: each cycle one plane starts distance, product, scaling and clipping. Their order is near x',
-  * near y', far y', far x', so that the advance starts while the exit distance is still computed. The advance takes
-  * `slices` cycles per side; a ray that misses the box skips it. With extra `timing` slices the operands of products and
-  * what was scaled are registered, and what follows comes later.
+  * The sides are pipelined: each cycle one plane starts distance, product, scaling and clipping. Their order is near
+  * x', near y', far y', far x', so that the advance starts while the exit distance is still computed. The advance takes
+  * `slices` cycles per side; a ray that misses the box skips it. With extra `timing` slices the operands of products
+  * and what was scaled are registered, and what follows comes later.
   */
 final class EntryControl(slices: Int, timing: TimingSlice) extends Module {
   val io = IO(new EntryControlIO(slices))

@@ -23,8 +23,8 @@ final class EntryDatapathIO(config: PathConfig) extends Bundle {
 }
 
 /** Arithmetic of [[RayEntry]]: one rounder, one adder for distances, one multiplier, one shifter and one adder for
-  * positions. All axes share them. The multiplier's first operand is a distance or the entry distance; its second one is
-  * a reciprocal or a slice of a shear factor.
+  * positions. All axes share them. The multiplier's first operand is a distance or the entry distance; its second one
+  * is a reciprocal or a slice of a shear factor.
   */
 final class EntryDatapath(config: PathConfig) extends Module {
   private val numbers  = config.numbers
@@ -101,7 +101,8 @@ final class EntryDatapath(config: PathConfig) extends Module {
   // At most 2^shearFraction, which occurs on a diagonal: one bit shorter than the format with its sign.
   private val slope = Rounding.narrow(scaled, numbers.gridBits)
 
-  // Entry and exit along the ray. All values below 0 are equivalent. The bits above are tested beside the sum, for timing
+  // Entry and exit along the ray. All values below 0 are equivalent. The bits above are tested beside the sum, for
+  // timing
   private val above    = (scaled >> (distanceBits - 1)).asUInt
   private val isLarge  = !above(above.getWidth - 1) && above.orR
   private val isSmall  = above(above.getWidth - 1) && !above.andR

@@ -25,8 +25,8 @@ final class EntryStagesIO(config: PathConfig) extends Bundle {
 
 /** Computes where a ray enters the object's box: a ray a cycle, one wide addition or one product a stage.
   *
-  * Entries below 0 are equivalent to 0, so they are unsigned from stage to stage. An exit below 0 is a flag. The order of
-  * the planes' distances, products, shifts and slacks follows docs/numbers.md, section 2.6.
+  * Entries below 0 are equivalent to 0, so they are unsigned from stage to stage. An exit below 0 is a flag. The order
+  * of the planes' distances, products, shifts and slacks follows docs/numbers.md, section 2.6.
   */
 final class EntryStages(config: PathConfig) extends Module {
   private val numbers      = config.numbers
@@ -67,8 +67,8 @@ final class EntryStages(config: PathConfig) extends Module {
     load(fars.last.asUInt(entryBits - 1, 0), stages.planes)
   )
 
-  // The sides have a second pad, for the error of their slopes. Far planes follow from near ones and the box's width, which
-  // is negative at inverted bounds
+  // The sides have a second pad, for the error of their slopes. Far planes follow from near ones and the box's width,
+  // which is negative at inverted bounds
   private val slopePad = tNearAlong >> numbers.vertexBits
   private val products = Seq.tabulate(2) { side =>
     val near   = load(nears(side), stages.planes) -& slopePad.zext
@@ -141,8 +141,8 @@ final class RayEntryIO(config: PathConfig) extends Bundle {
   *
   * A ray may come before its quotients, which must stay valid until they are accepted. If they are in time, the latency
   * is 10 + 2 · slices cycles (14 with a shear factor of two multiplier slices), or 12 for a ray that misses the
-  * box; with `units.extraSlices` three more. The next ray is accepted in the cycle in which the result is taken. Source:
-  * docs/numbers.md, sections 2.3 to 2.8.
+  * box; with `units.extraSlices` three more. The next ray is accepted in the cycle in which the result is taken.
+  * Source: docs/numbers.md, sections 2.3 to 2.8.
   */
 final class RayEntry(config: PathConfig) extends Module {
   val io = IO(new RayEntryIO(config))

@@ -33,13 +33,14 @@ final class RayGeneratorIO(config: PathConfig) extends Bundle {
   val pixel     = Output(new RayPosition(config)) // the pixel of the offered ray
 }
 
-/** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
+/** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position <<
+  * unitShift`.
   *
-  * Throughput: a ray per cycle while each pixel follows the one before it in the Morton order of its tile, and a cycle more
-  * for each pixel that is left out; pixels of two tiles may be mixed, `inObjectTile` tells them apart. Another pixel takes
-  * `coordinateBits` + 1 cycles, which is the most. Any order gives the same rays. Latency: 2 cycles, later by the cycles of
-  * such sums, and if another ray waits before it. The registers may change when the unit has been empty for
-  * [[RayGenerator.emptyCycles]] cycles. Source: docs/traversal.md.
+  * Throughput: a ray per cycle while each pixel follows the one before it in the Morton order of its tile, and a cycle
+  * more for each pixel that is left out; pixels of two tiles may be mixed, `inObjectTile` tells them apart. Another
+  * pixel takes `coordinateBits` + 1 cycles, which is the most. Any order gives the same rays. Latency: 2 cycles, later
+  * by the cycles of such sums, and if another ray waits before it. The registers may change when the unit has been
+  * empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/traversal.md.
   */
 final class RayGenerator(config: PathConfig) extends Module {
   val io = IO(new RayGeneratorIO(config))

@@ -29,10 +29,11 @@ object RaySetup {
     else new RaySetupPipeline(config)
 }
 
-/** Prepares a ray a cycle for traversal, in order and bit for bit as [[SequentialRaySetup]]: docs/traversal.md, ray set-up.
+/** Prepares a ray a cycle for traversal, in order and bit for bit as [[SequentialRaySetup]]: docs/traversal.md, ray
+  * set-up.
   *
-  * Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All stages stall together while the offered ray is
-  * not taken; a stage without a ray keeps its values. `busy`: a ray enters. Source: docs/numbers.md, section 2.
+  * Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All stages stall together while the offered
+  * ray is not taken; a stage without a ray keeps its values. `busy`: a ray enters. Source: docs/numbers.md, section 2.
   */
 final class RaySetupPipeline(config: PathConfig) extends RaySetup(config) {
   private val numbers = config.numbers
@@ -118,9 +119,10 @@ final class RaySetupPipeline(config: PathConfig) extends RaySetup(config) {
 
 /** Prepares rays for traversal, one after the other and in order, with up to three rays in flight: docs/traversal.md.
   *
-  * With quotients of 31 and 19 bits, the latency is about 30 cycles and the throughput at least one ray every 16 cycles; it
-  * is one every 27 cycles at the widest formats with extra slices. The quotients of a component that is 0 are computed,
-  * then replaced. A direction of 0 gives a ray that does not enter the box. Source: docs/numbers.md, section 2.
+  * With quotients of 31 and 19 bits, the latency is about 30 cycles and the throughput at least one ray every 16
+  * cycles; it is one every 27 cycles at the widest formats with extra slices. The quotients of a component that is 0
+  * are computed, then replaced. A direction of 0 gives a ray that does not enter the box. Source: docs/numbers.md,
+  * section 2.
   */
 final class SequentialRaySetup(config: PathConfig) extends RaySetup(config) {
   private val numbers = config.numbers

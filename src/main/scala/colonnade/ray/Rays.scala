@@ -74,8 +74,8 @@ final class EntryLimits(numbers: NumberFormats) extends Bundle {
   val filter = new HitFilter
 }
 
-/** A ray's dominant axis (0, 1, 2) and the signs of its direction in the ray's own frame. There, z' is the dominant axis,
-  * and x' and y' are the axes after it in cyclic order.
+/** A ray's dominant axis (0, 1, 2) and the signs of its direction in the ray's own frame. There, z' is the dominant
+  * axis, and x' and y' are the axes after it in cyclic order.
   */
 final class RayOrientation extends Bundle {
   val axis     = UInt(2.W)

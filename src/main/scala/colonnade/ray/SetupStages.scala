@@ -53,8 +53,8 @@ final class DirectionStagesIO(config: PathConfig) extends Bundle {
   val mantissas = Output(new DirectionMantissas(config.numbers))
 }
 
-/** What a [[DirectionNormaliser]] does, a ray a cycle: stage 0 has the magnitudes; from there, three normalisers and three
-  * comparators in parallel lead to stage 1. Source: docs/numbers.md, sections 2.1 and 2.2.
+/** What a [[DirectionNormaliser]] does, a ray a cycle: stage 0 has the magnitudes; from there, three normalisers and
+  * three comparators in parallel lead to stage 1. Source: docs/numbers.md, sections 2.1 and 2.2.
   */
 final class DirectionStages(config: PathConfig) extends Module {
   private val numbers = config.numbers

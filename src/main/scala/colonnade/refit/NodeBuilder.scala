@@ -21,8 +21,8 @@ final class NodeBuilder(config: ColonnadeConfig) extends Module {
   private val address    = Reg(chiselTypeOf(records.bits.address))
   private val count      = node.entry.children
 
-  // Steps: exponent, shift, correction, and the planes of a child each, a cycle after they are shifted. The next node begins
-  // while the record waits, and is not corrected before it has left
+  // Steps: exponent, shift, correction, and the planes of a child each, a cycle after they are shifted. The next node
+  // begins while the record waits, and is not corrected before it has left
   private val isBusy   = RegInit(false.B)
   private val step     = Reg(UInt(3.W))
   private val first    = 3

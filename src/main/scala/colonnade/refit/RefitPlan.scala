@@ -146,8 +146,8 @@ final class PlanReaderIO(config: ColonnadeConfig) extends Bundle {
   val isError = Output(Bool()) // a pulse: a line is not there, and another one is read
 }
 
-/** Reads the plan ahead, and requests the lines of vertices that it names. At most [[RefitPlan.linesInFlight]] of them are
-  * on their way.
+/** Reads the plan ahead, and requests the lines of vertices that it names. At most [[RefitPlan.linesInFlight]] of them
+  * are on their way.
   */
 final class PlanReader(config: ColonnadeConfig) extends Module {
   val io = IO(new PlanReaderIO(config))

@@ -40,8 +40,9 @@ final class AngleCycles(config: PathConfig) {
   val lengths: Int = angle + 4
 }
 
-/** The vector from a point to a light, and its angle to the normal: docs/numbers.md, 5.4 to 5.6 and the product of 5.7. An
-  * angle every three cycles, by three multipliers, one for each dot product, and one for the lengths, digit by digit.
+/** The vector from a point to a light, and its angle to the normal: docs/numbers.md, 5.4 to 5.6 and the product of 5.7.
+  * An angle every three cycles, by three multipliers, one for each dot product, and one for the lengths, digit by
+  * digit.
   */
 final class AngleStage(config: PathConfig) extends Module {
   private val numbers   = config.numbers

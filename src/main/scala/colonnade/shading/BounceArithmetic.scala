@@ -136,7 +136,8 @@ final class BounceRootsIO(numbers: NumberFormats) extends Bundle {
 
 /** The root of Snell's discriminant and the cosine's root and quotient, from one `RootDivider`: docs/shading.md.
   *
-  * A discriminant that is too long for the square root is divided by four until it fits, and its root is doubled as often.
+  * A discriminant that is too long for the square root is divided by four until it fits, and its root is doubled as
+  * often.
   */
 final class BounceRoots(numbers: NumberFormats) extends Module {
   private val formats      = new BounceFormats(numbers)

@@ -44,7 +44,8 @@ final class BounceFormats(numbers: NumberFormats) {
 
   val productBits: Int = wideBits + longBits
 
-  /** The widest of: a dot product with one bit to measure its length, the discriminant, and the offset's product; signed.
+  /** The widest of: a dot product with one bit to measure its length, the discriminant, and the offset's product;
+    * signed.
     */
   val sumBits: Int = (2 * shadeBits + 3).max(numbers.rootBits + 8).max(numbers.gridBits + 10)
 }

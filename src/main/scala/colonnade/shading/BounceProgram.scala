@@ -6,8 +6,8 @@ import colonnade.microcode.{Microprogram, Overlap, Repeat, StepEncoding}
 
 /** The bounce unit's microprogram. A step takes one cycle, or one per digit if it multiplies.
   *
-  * The product of a step is accumulated in the next one; the sum is ready two steps after its last product. To start over
-  * is to take the geometric normal instead of the smooth one.
+  * The product of a step is accumulated in the next one; the sum is ready two steps after its last product. To start
+  * over is to take the geometric normal instead of the smooth one.
   *
   * @param takes      a hit is taken
   * @param isTaken    the result is taken

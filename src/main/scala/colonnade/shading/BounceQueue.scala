@@ -16,13 +16,16 @@ final class BounceHit(config: PathConfig) extends Bundle {
   val isRough = Lobe(config.device).map(_ => Bool())
 }
 
-/** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction. */
+/** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction.
+  */
 final class BounceDirections(config: PathConfig) extends Bundle {
   val faceForwardNormal = SInt((NumberFormats.normalBits + 1).W)
   val dir               = SInt((new ShaderFormats(config.numbers).shadeBits + 1).W)
 }
 
-/** Components of vectors that are known late: the reflection's origin and the shading normal; and what kind of normal it is. */
+/** Components of vectors that are known late: the reflection's origin and the shading normal; and what kind of normal
+  * it is.
+  */
 final class BouncePoint(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
@@ -57,8 +60,8 @@ final private class BounceSurface(config: PathConfig) extends Bundle {
   val origin   = Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)) // of a reflection
 }
 
-/** Hits on mirrors and glass on their way from the [[ShadingPipeline]] to the bounce units, in order, and their bounces on
-  * the way back, which meet what is stored of their surface. A result is offered in the cycle after it came.
+/** Hits on mirrors and glass on their way from the [[ShadingPipeline]] to the bounce units, in order, and their bounces
+  * on the way back, which meet what is stored of their surface. A result is offered in the cycle after it came.
   *
   * @param places of the queues
   */

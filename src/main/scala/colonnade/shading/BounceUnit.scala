@@ -15,12 +15,13 @@ final class BounceUnitIO(config: PathConfig) extends Bundle {
   val busy = Output(Bool()) // holds a bounce
 }
 
-/** Reflection at mirrors; refraction and Schlick's Fresnel term at glass: docs/numbers.md, section 6, and docs/shading.md.
+/** Reflection at mirrors; refraction and Schlick's Fresnel term at glass: docs/numbers.md, section 6, and
+  * docs/shading.md.
   *
-  * One bounce at a time, in a program whose products take two cycles or more. The shading normal is the smooth one, unless
-  * that turns away from the ray or would send it to the wrong side of the surface: then the program starts over with the
-  * geometric one. At 32b32s64d a mirror takes 44 cycles, glass 104 from behind and about 170 from the front. A restart
-  * adds 25 cycles, or all cycles so far and 11.
+  * One bounce at a time, in a program whose products take two cycles or more. The shading normal is the smooth one,
+  * unless that turns away from the ray or would send it to the wrong side of the surface: then the program starts over
+  * with the geometric one. At 32b32s64d a mirror takes 44 cycles, glass 104 from behind and about 170 from the front. A
+  * restart adds 25 cycles, or all cycles so far and 11.
   */
 final class BounceUnit(config: PathConfig) extends Module {
   private val formats = new BounceFormats(config.numbers)
@@ -73,8 +74,8 @@ final class BounceUnit(config: PathConfig) extends Module {
   when(!state.hasFresnel)(io.result.bits.fresnel.raw := 0.U)
 }
 
-/** [[BounceUnit]] with several hits at a time: docs/shading.md. Mirrors take a [[MirrorPipeline]], a hit every three cycles;
-  * glass takes one of several units. Results come in any order; the hits in it are of different contexts.
+/** [[BounceUnit]] with several hits at a time: docs/shading.md. Mirrors take a [[MirrorPipeline]], a hit every three
+  * cycles; glass takes one of several units. Results come in any order; the hits in it are of different contexts.
   */
 final class BouncePipeline(config: PathConfig) extends Module {
   val io = IO(new BounceUnitIO(config))

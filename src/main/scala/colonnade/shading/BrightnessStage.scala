@@ -22,8 +22,8 @@ final class BrightnessStageIO(config: PathConfig) extends Bundle {
   val colour = Input(Rgb(FrameRegisters.intensity))  // of the light, in three cycles from `BrightnessCycles.colour` on
   val direct = Output(Rgb(FrameRegisters.intensity)) // in the third cycle after
 
-  /** From `BrightnessCycles.cosine` on for three cycles: whether the surface is rough metal. One cycle later its slope, and
-    * eight cycles later its peak.
+  /** From `BrightnessCycles.cosine` on for three cycles: whether the surface is rough metal. One cycle later its slope,
+    * and eight cycles later its peak.
     */
   val isRough = rough(Bool())
   val slope   = rough(UInt(Lobe.slopeBits.W))
@@ -48,8 +48,9 @@ final class BrightnessCycles(config: PathConfig) {
   val direct:          Int = colour + 3
 }
 
-/** The cosine of an angle, the light's falloff and the light that arrives: docs/numbers.md, 5.7 and 5.8. An angle every three
-  * cycles, by a square root, two dividers, a multiplier for the brightness, digit by digit, and one for the three channels.
+/** The cosine of an angle, the light's falloff and the light that arrives: docs/numbers.md, 5.7 and 5.8. An angle every
+  * three cycles, by a square root, two dividers, a multiplier for the brightness, digit by digit, and one for the three
+  * channels.
   */
 final class BrightnessStage(config: PathConfig) extends Module {
   private val numbers   = config.numbers

@@ -20,8 +20,8 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   val cube      = new LightPort(config)            // the light cube
 }
 
-/** Colours of paths: docs/numbers.md, 5.9 and 6. A path has a radiance so far, and a throughput that weights what it still
-  * hits. They are in a table. A pipeline, a slot of a `ColourSchedule` a cycle: docs/shading.md. {{{
+/** Colours of paths: docs/numbers.md, 5.9 and 6. A path has a radiance so far, and a throughput that weights what it
+  * still hits. They are in a table. A pipeline, a slot of a `ColourSchedule` a cycle: docs/shading.md. {{{
   *
   * bounce, end ─▶ read ─▶ product ─▶ sum ─▶ reflected ─▶ seen ─▶ part ─▶ colour or radiance, throughput
   *
@@ -30,12 +30,13 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   * reflection  light · transmittance  ambient                   · albedo   outgoing: kept
   * throughput  throughput · tint      0                         · fresnel  what is reflected   · kept or beyond
   * }}}
-  * Outgoing is what a surface reflects and emits, and beyond is the background or light of the cube. An end has 3 · lights
-  * slots, with the lights that are on, at least one; without a surface 3. A bounce has 3, and 3 · lights more if its
-  * reflection shows a surface; none if it is the path's first and has no Fresnel reflection. A surface that gathers has 3
-  * more than an end. Colours come in any order.
+  * Outgoing is what a surface reflects and emits, and beyond is the background or light of the cube. An end has 3 ·
+  * lights slots, with the lights that are on, at least one; without a surface 3. A bounce has 3, and 3 · lights more if
+  * its reflection shows a surface; none if it is the path's first and has no Fresnel reflection. A surface that gathers
+  * has 3 more than an end. Colours come in any order.
   *
-  * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))
+  * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights ·
+  * transmittance))
   */
 final class ColourUnit(config: PathConfig) extends Module {
   private val lights     = config.device.frame.lights

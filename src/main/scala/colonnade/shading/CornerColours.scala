@@ -30,9 +30,9 @@ final class CornerColoursIO(config: PathConfig) extends Bundle {
   * The weights do not add up to one, so each channel is a quotient: the weighted sum of the corners over the sum of the
   * weights, rounded to nearest. It lies between the corners, and equal corners give their colour.
   *
-  * One hit at a time: nine products, then twelve cycles in which three restoring dividers find a bit each of their channel.
-  * Latency 23 cycles from `start`, and one for each cycle in which the multiplier takes other operands. No product is
-  * asked for when the hit does not use the colours.
+  * One hit at a time: nine products, then twelve cycles in which three restoring dividers find a bit each of their
+  * channel. Latency 23 cycles from `start`, and one for each cycle in which the multiplier takes other operands. No
+  * product is asked for when the hit does not use the colours.
   */
 final class CornerColours(config: PathConfig) extends Module {
   private val colourBits = NumberFormats.colourBits

@@ -23,11 +23,11 @@ private object CosineStep extends ChiselEnum {
   val idle, root, quotient, shiftCosine, divideFalloff, falloffQuotient, shiftFalloff, done = Value
 }
 
-/** The cosine of an angle, and the light's falloff: docs/numbers.md, 5.7 and 5.8. The cosine is the dot product divided by
-  * the root of the product of both squared lengths.
+/** The cosine of an angle, and the light's falloff: docs/numbers.md, 5.7 and 5.8. The cosine is the dot product divided
+  * by the root of the product of both squared lengths.
   *
-  * One angle at a time. Latency: square root, division, four cycles, and the quotient's shift in steps of four bits and one
-  * bit; a second division for a light with a falloff. The cosine of an angle that is not acute is 0 at once.
+  * One angle at a time. Latency: square root, division, four cycles, and the quotient's shift in steps of four bits and
+  * one bit; a second division for a light with a falloff. The cosine of an angle that is not acute is 0 at once.
   */
 final class CosineUnit(numbers: NumberFormats) extends Module {
   private val formats  = new ShaderFormats(numbers)

@@ -18,8 +18,8 @@ final class ShaderMultiplierIO(formats: ShaderFormats, hasCornerColours: Boolean
 
 /** The shader's only multiplier; exact products.
   *
-  * Latency one or two cycles, one product per cycle. The geometry's program leaves a third of its cycles free, and all cycles in
-  * which it waits for the cosine unit or the corner colours. So colours cannot starve.
+  * Latency one or two cycles, one product per cycle. The geometry's program leaves a third of its cycles free, and all
+  * cycles in which it waits for the cosine unit or the corner colours. So colours cannot starve.
   */
 final class ShaderMultiplier(formats: ShaderFormats, hasCornerColours: Boolean, latency: Int = 1) extends Module {
   val io = IO(new ShaderMultiplierIO(formats, hasCornerColours))
@@ -97,8 +97,8 @@ final class GeometryAccumulator(config: PathConfig) extends Module {
     Mux1H((0 to 3).map(k => (io.exponent === k.U) -> sum.asUInt(k + 2 * shadeBits - 2, k + shadeBits - 1)))
 }
 
-/** A vector of three signed components in registers that rotate. Its user reads component 0 and rotates the vector. After
-  * three uses each component is back in its place, so no component is ever selected.
+/** A vector of three signed components in registers that rotate. Its user reads component 0 and rotates the vector.
+  * After three uses each component is back in its place, so no component is ever selected.
   */
 private[shading] object VectorRegister {
   def apply(bits: Int): Vec[SInt] = Reg(Vec(3, SInt(bits.W)))

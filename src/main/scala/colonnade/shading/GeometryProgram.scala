@@ -32,8 +32,8 @@ final class GeometryConditions {
   * adder      |       n and |n|   |           P +=       P +=   |  l = light - P   |l| |
   * shifter    |                                               | light <<  |n <<|   | l << | l << |
   * }}}
-  * The product of a step is accumulated `productLatency` steps later, here in the next one. The sum is ready a step after
-  * that, and its rounded value two steps after.
+  * The product of a step is accumulated `productLatency` steps later, here in the next one. The sum is ready a step
+  * after that, and its rounded value two steps after.
   */
 final class GeometryProgram(
     formats:        ShaderFormats,

@@ -51,8 +51,8 @@ final class LightCubeIO(config: PathConfig) extends Bundle {
   val memory = new CubePort
 }
 
-/** The texel of the light cube in the direction of each context's last ray: docs/gather.md. A ray a cycle. A path that sees
-  * lights is told where one is. {{{
+/** The texel of the light cube in the direction of each context's last ray: docs/gather.md. A ray a cycle. A path that
+  * sees lights is told where one is. {{{
   *
   * ray ─┬▶ scaled direction ─▶ sum ─▶ face and slopes ─▶ table, by context ─▶ memory
   *      └▶ offset of origin ────┘

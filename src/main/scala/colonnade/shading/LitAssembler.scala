@@ -42,8 +42,8 @@ final class LitAssemblerIO(config: PathConfig) extends Bundle {
   val lit     = Decoupled(new LitSurface(config))
 }
 
-/** Puts surfaces together with their lights, in the order in which they come. A light a cycle; a surface leaves with the
-  * last of its lights.
+/** Puts surfaces together with their lights, in the order in which they come. A light a cycle; a surface leaves with
+  * the last of its lights.
   *
   * @param places of the queues
   */

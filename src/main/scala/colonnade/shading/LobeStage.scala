@@ -17,8 +17,8 @@ final class LobeStageIO(numbers: NumberFormats) extends Bundle {
   val share  = Output(UInt((numbers.cosineFraction + Lobe.wholeBits).W)) // from cycle `latency` on, for three cycles
 }
 
-/** How brightly rough metal shows a light, by the cosine between the light and the axis of its lobe: docs/gather.md. One
-  * every three cycles, by a multiplier, digit by digit, and tables of logarithms and powers.
+/** How brightly rough metal shows a light, by the cosine between the light and the axis of its lobe: docs/gather.md.
+  * One every three cycles, by a multiplier, digit by digit, and tables of logarithms and powers.
   *
   * @param first cycle of the cosine in the schedule
   */

@@ -25,8 +25,8 @@ final private[shading] class MirrorHit(config: PathConfig) extends Bundle {
   *      ▲                                        │ with the geometric normal
   *      └────────────────────────────────────────┘
   * }}}
-  * The stages follow a [[colonnade.common.ModuloSchedule]], an axis a cycle, and never stall: a hit enters only if it has
-  * a place in the queue. A result is offered 14 cycles after its request was taken; a restart takes 12 cycles more.
+  * The stages follow a [[colonnade.common.ModuloSchedule]], an axis a cycle, and never stall: a hit enters only if it
+  * has a place in the queue. A result is offered 14 cycles after its request was taken; a restart takes 12 cycles more.
   */
 final class MirrorPipeline(config: PathConfig) extends Module {
   private val formats   = new BounceFormats(config.numbers)

@@ -14,8 +14,8 @@ object PathEnd extends ChiselEnum {
   val lit        = Value // a surface in ambient light and lights
   val directView = Value // a surface of the environment that the camera sees: with its shadow ratio
 
-  /** A point of the environment in direct view whose own ray has met the object. The path's radiance replaces the ambient
-    * light.
+  /** A point of the environment in direct view whose own ray has met the object. The path's radiance replaces the
+    * ambient light.
     */
   val gathered = Value
 
@@ -31,7 +31,8 @@ object PathEnd extends ChiselEnum {
   def is(config: PathConfig, path: Type, end: Type): Bool = if (has(config, end)) path === end else false.B
 }
 
-/** What the stages of [[ColourUnit]] ask of a [[PathEnd]]; none of it takes a register in a device without such ends. */
+/** What the stages of [[ColourUnit]] ask of a [[PathEnd]]; none of it takes a register in a device without such ends.
+  */
 final private[shading] class ShownEnd extends Bundle {
   val hasSurface, isInCube, hasGathered, gathers = Bool()
 }

@@ -54,12 +54,14 @@ final class SamplePoints(config: PathConfig) extends Module {
 object SamplePoints {
   val coordinateBits: Int = 10 // low bits of a pixel's coordinates that count
 
-  /** Degree and coefficients of a primitive polynomial, and first direction numbers: the third and the fourth dimension of
-    * Sobol's sequence (Joe and Kuo 2008).
+  /** Degree and coefficients of a primitive polynomial, and first direction numbers: the third and the fourth dimension
+    * of Sobol's sequence (Joe and Kuo 2008).
     */
   private val sobol = Seq((2, 1, Seq(1, 3)), (3, 1, Seq(1, 3, 1)))
 
-  /** For each byte of a point, what each bit of a pixel's Morton code adds to it; x is in the even bits, low ones first. */
+  /** For each byte of a point, what each bit of a pixel's Morton code adds to it; x is in the even bits, low ones
+    * first.
+    */
   val matrix: Seq[Seq[Int]] = sobol.map { case (degree, coefficients, first) =>
     val numbers = (degree until 2 * coordinateBits).foldLeft(first) { (m, k) =>
       val middle = (1 until degree).map(i => (coefficients >> (degree - 1 - i) & 1) * (m(k - i) << i))

@@ -15,7 +15,8 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val phase = Input(ModuloSchedule.phase())
   val point = Input(new SamplePoint) // in cycle 0
 
-  /** From cycle 1 on. At a mirror or glass, which `isBounce` names in the first of these cycles, the direction counts. */
+  /** From cycle 1 on. At a mirror or glass, which `isBounce` names in the first of these cycles, the direction counts.
+    */
   val isBounce          = Input(Bool())
   val faceForwardNormal = Input(SInt((NumberFormats.normalBits + 1).W))
   val dir               = Input(SInt((formats.shadeBits + 1).W))
@@ -24,8 +25,8 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val axis        = Input(SInt(formats.narrowBits.W))
   val squaredAxis = Input(UInt(formats.dotBits.W))
 
-  /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough. From the
-    * fourth to the sixth: it is a mirror or glass.
+  /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough. From
+    * the fourth to the sixth: it is a mirror or glass.
     */
   val alpha   = Input(UInt(Lobe.alphaBits.W))
   val isRough = Input(Bool())
@@ -35,10 +36,10 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val microfacet = Output(Vec(3, SInt((ScatterStage.facetBits + 1).W))) // in cycle `facet0`: it, scaled
 }
 
-/** The direction of the ray that gathers light at a surface, by a point s of the unit sphere: docs/gather.md. At a diffuse
-  * one n + |n| · s about its normal n, with the cosine as its density; at rough metal a ray of the lobe about its axis.
-  * At a rough mirror or glass it is the normal of a microfacet. One every three cycles, by a square root and nine
-  * multipliers.
+/** The direction of the ray that gathers light at a surface, by a point s of the unit sphere: docs/gather.md. At a
+  * diffuse one n + |n| · s about its normal n, with the cosine as its density; at rough metal a ray of the lobe about
+  * its axis. At a rough mirror or glass it is the normal of a microfacet. One every three cycles, by a square root and
+  * nine multipliers.
   */
 final class ScatterStage(config: PathConfig) extends Module {
   import ScatterStage._
@@ -146,7 +147,8 @@ final class ScatterStage(config: PathConfig) extends Module {
     })
   }
 
-  // If it points below the surface, or away from the ray: at a rough surface the other side of the axis, else the opposite
+  // If it points below the surface, or away from the ray: at a rough surface the other side of the axis, else the
+  // opposite
   private val sideCycle = wide + 3
   private val geometric = {
     val upwards = Rounding.floor(io.faceForwardNormal, NumberFormats.normalBits - sideBits)

@@ -7,13 +7,13 @@ import colonnade.formats.{FrameRegisters, Material, MaterialKind, Rgb, Vec3}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
 
-/** Shades hits: docs/numbers.md, 5 and 6. A hit on a diffuse surface gives the direct light of each light, with Lambert's
-  * cosine and the light's falloff. A hit on a mirror or glass gives the outgoing ray.
+/** Shades hits: docs/numbers.md, 5 and 6. A hit on a diffuse surface gives the direct light of each light, with
+  * Lambert's cosine and the light's falloff. A hit on a mirror or glass gives the outgoing ray.
   *
-  * Hits of one kind leave in order. The geometry holds one hit, the cosine and direct units one light, and the bounce unit
-  * one hit; geometry and direct unit share a multiplier. At 32b32s64d a hit with one light enters every 41 to 45 cycles (12
-  * more if the smooth normal is zero) and leaves about 85 cycles later. Each further light takes 20 to 40 cycles. A surface
-  * that faces away from a light needs neither root nor quotient.
+  * Hits of one kind leave in order. The geometry holds one hit, the cosine and direct units one light, and the bounce
+  * unit one hit; geometry and direct unit share a multiplier. At 32b32s64d a hit with one light enters every 41 to 45
+  * cycles (12 more if the smooth normal is zero) and leaves about 85 cycles later. Each further light takes 20 to 40
+  * cycles. A surface that faces away from a light needs neither root nor quotient.
   *
   * A material's number is truncated to the bits that the table needs; beyond the table it means entry 0.
   */

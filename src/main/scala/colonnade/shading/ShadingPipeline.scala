@@ -8,16 +8,16 @@ import colonnade.config.PathConfig
 import colonnade.formats.{Lobe, MaterialKind}
 import colonnade.numbers.Rounding
 
-/** Shades hits as [[SequentialShader]] does, bit for bit: a hit with one light every three cycles, and three cycles more for
-  * each further light. {{{
+/** Shades hits as [[SequentialShader]] does, bit for bit: a hit with one light every three cycles, and three cycles
+  * more for each further light. {{{
   *
   * hit ─▶ SurfaceStage ─ normal, origin ─▶ AngleStage ─ angle, falloff ─▶ BrightnessStage ─ light ─┬▶ lit surface
   *           │   │                 └──────────────────────── queue of surfaces ────────────────────┘
   *           └───┴─ queue of bounces ─▶ BouncePipeline ─▶ bounced ray
   * }}}
-  * The stages follow a [[colonnade.common.ModuloSchedule]] and never stall: a light on a hit enters only if it has a place
-  * in the queues at the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's
-  * point and normal are computed again for each light.
+  * The stages follow a [[colonnade.common.ModuloSchedule]] and never stall: a light on a hit enters only if it has a
+  * place in the queues at the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The
+  * hit's point and normal are computed again for each light.
   */
 final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   import ShadingPipeline._
@@ -96,7 +96,8 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   bright.angle.isAcute := faces
   bright.falloff       := angle.falloff
 
-  // Rough metal is lit about the direction in which a smooth mirror would reflect; a rough mirror or glass has microfacets
+  // Rough metal is lit about the direction in which a smooth mirror would reflect; a rough mirror or glass has
+  // microfacets
   private val roughs = io.sample.map { sample =>
     // Known in the cycle after the entry, for all lights of the hit
     val isNew   = RegNext(enters, false.B)
@@ -270,7 +271,8 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     io.isIllegalTexel.get := texels.isIllegal
   }
 
-  /** The hit that enters. A point of the environment enters as a hit at distance 0 with a geometric normal of its own. */
+  /** The hit that enters. A point of the environment enters as a hit at distance 0 with a geometric normal of its own.
+    */
   private def entered(isPoint: Bool): ShadingHit = {
     val request = io.request.bits
     val to      = Wire(new ShadingHit(config))
@@ -312,7 +314,8 @@ object ShadingPipeline {
   private def places(config: PathConfig): Int =
     1 << log2Ceil(new BrightnessCycles(config).direct / ModuloSchedule.interval + 4)
 
-  /** The entry of a material's number, truncated to the bits that the table needs; beyond the table it means entry 0. */
+  /** The entry of a material's number, truncated to the bits that the table needs; beyond the table it means entry 0.
+    */
   private[colonnade] def material[T <: Data](config: PathConfig, table: Vec[T], number: UInt): T = {
     val indexBits = log2Ceil(config.device.frame.materials)
     val entries   = table.padTo(1 << indexBits, table.head)

@@ -17,12 +17,14 @@ final class ShadowRatioRequest(bits: Int) extends Bundle {
   */
 final class ShadowRatiosIO(config: PathConfig, bits: Int) extends Bundle {
 
-  /** A pixel claims the unit, only while it is not busy. Its channels follow from three cycles later on, then its colour. */
+  /** A pixel claims the unit, only while it is not busy. Its channels follow from three cycles later on, then its
+    * colour.
+    */
   val claim = Input(Bool())
   val busy  = Output(Bool())
 
-  /** A channel, in the order 0, 1, 2; and its light without the object, at least `part` unless points of the environment
-    * gather.
+  /** A channel, in the order 0, 1, 2; and its light without the object, at least `part` unless points of the
+    * environment gather.
     */
   val load  = Flipped(Valid(new ShadowRatioRequest(bits)))
   val whole = Input(UInt(bits.W))

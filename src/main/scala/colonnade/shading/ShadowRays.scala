@@ -30,8 +30,8 @@ final class ShadowRaysIO(config: PathConfig) extends Bundle {
 /** Makes shadow rays, from a context's surface to a light, and the rays that gather light there: docs/shading.md. Two
   * rays in three cycles; all axes at a time, one shifter and subtractor for each.
   *
-  * A ray is offered two cycles after its request, in the order of the requests. A request that waits for the ray before it
-  * reads its origin again, so no register holds the origin.
+  * A ray is offered two cycles after its request, in the order of the requests. A request that waits for the ray before
+  * it reads its origin again, so no register holds the origin.
   */
 final class ShadowRays(config: PathConfig) extends Module {
   private val scene = new RayFormats(config.numbers).scene

@@ -25,8 +25,8 @@ final class SurfaceStageIO(config: PathConfig) extends Bundle {
 }
 
 /** The point and the shading normal of a hit: docs/numbers.md, 5.1 to 5.3 and 5.5. A hit every three cycles, by three
-  * multipliers for the normal, two for the products of the slopes and the distance, digit by digit, and one for the offset.
-  * A smooth normal of zero gives way to the geometric one without a second start.
+  * multipliers for the normal, two for the products of the slopes and the distance, digit by digit, and one for the
+  * offset. A smooth normal of zero gives way to the geometric one without a second start.
   */
 final class SurfaceStage(config: PathConfig) extends Module {
   private val numbers = config.numbers
@@ -120,7 +120,8 @@ final class SurfaceStage(config: PathConfig) extends Module {
   io.normal            := normal.at(xyz(7))
   io.isSmooth          := !isFlat.at(7)
 
-  /** The bitwise or of three magnitudes, which is as long as the largest of them; `negative` is the negated component. */
+  /** The bitwise or of three magnitudes, which is as long as the largest of them; `negative` is the negated component.
+    */
   private def longest(cycles: Seq[Int], component: SInt, negative: SInt) =
     accumulate(cycles, Mux(component < 0.S, negative, component).asUInt(component.getWidth - 2, 0))(_ | _)
 

@@ -166,7 +166,9 @@ final class NodeOperands(config: TraversalConfig) extends Bundle {
   val tMax = SInt(numbers.boxDistanceBits.W)
 }
 
-/** A child's planes, counted along the ray from the first plane of the node's range: the ray crosses `nearPlanes` first. */
+/** A child's planes, counted along the ray from the first plane of the node's range: the ray crosses `nearPlanes`
+  * first.
+  */
 final class ChildPlanes(config: TraversalConfig) extends Bundle {
   val isOccupied = Bool()
   val nearPlanes = Vec(3, UInt(config.device.geometry.boxBits.W))

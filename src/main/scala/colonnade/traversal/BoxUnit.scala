@@ -140,7 +140,8 @@ final class EnteredChild(config: TraversalConfig) extends Bundle {
   val tNear  = new Fixed(new RayFormats(config.numbers).units)
 }
 
-/** One ray to test against one node; `tMax` is the largest entry distance that may still hold a hit, see [[TMaxUnits]]. */
+/** One ray to test against one node; `tMax` is the largest entry distance that may still hold a hit, see [[TMaxUnits]].
+  */
 final class BoxCandidate(config: TraversalConfig) extends Bundle {
   val context = Context(config)
   val node    = new RecordFormats(config.device).node

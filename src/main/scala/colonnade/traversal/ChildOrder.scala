@@ -22,7 +22,8 @@ final class ChildOrder(config: TraversalConfig) extends Bundle {
 
 object ChildOrder {
 
-  /** Sorts by rank, combinationally: all pairs are compared at once, and a child's rank is its number of predecessors. */
+  /** Sorts by rank, combinationally: all pairs are compared at once, and a child's rank is its number of predecessors.
+    */
   def apply(config: TraversalConfig, isEntered: Seq[Bool], tNear: Seq[SInt], distance: NodeDistance): ChildOrder = {
     val slots      = tNear.indices
     val isNotAfter = Map.from(for (i <- slots; j <- slots if i < j) yield (i, j) -> (tNear(i) <= tNear(j)))

@@ -103,8 +103,8 @@ final class EdgeStageIO(formats: TriangleFormats) extends Bundle {
   val slot     = Input(new TriangleSlot)
   val sheared  = Input(Vec(2, new Fixed(formats.grid))) // x and y of the vertex of `slot`
 
-  /** All edges of a triangle are known, and the other outputs valid: it is the second one of a pair; the ray's line crosses
-    * it.
+  /** All edges of a triangle are known, and the other outputs valid: it is the second one of a pair; the ray's line
+    * crosses it.
     */
   val decides         = Output(Bool())
   val isSecond        = Output(Bool())
@@ -115,9 +115,9 @@ final class EdgeStageIO(formats: TriangleFormats) extends Bundle {
 
 /** Exact edge functions of the sheared triangles; numbers.md 4.3.
   *
-  * One edge per slot, in the order 2, 0, 1: load two vertices, multiply, subtract, test the sign. The triangle is decided
-  * with its edge 1, four slots after its last vertex came. The second triangle of a pair needs only edges 0 and 1: its
-  * edge 2 is the first one's, negated. A triangle seen edge-on, whose edge functions are all zero, is not
+  * One edge per slot, in the order 2, 0, 1: load two vertices, multiply, subtract, test the sign. The triangle is
+  * decided with its edge 1, four slots after its last vertex came. The second triangle of a pair needs only edges 0 and
+  * 1: its edge 2 is the first one's, negated. A triangle seen edge-on, whose edge functions are all zero, is not
   * crossed. Without a triangle the registers hold.
   */
 final class EdgeStage(numbers: NumberFormats) extends Module {

@@ -13,8 +13,9 @@ import colonnade.ray.{RayFormats, TriangleRay}
 final class TriangleFormats(numbers: NumberFormats) {
   val grid: FixedPointFormat = new RayFormats(numbers).grid
 
-  /** Width of an edge function. Coordinates are within 3 · 2^(gridBits - 3) steps, so a signed edge function is two bits
-    * narrower than the product of two coordinates plus its sign. The unsigned sum of three magnitudes has the same width.
+  /** Width of an edge function. Coordinates are within 3 · 2^(gridBits - 3) steps, so a signed edge function is two
+    * bits narrower than the product of two coordinates plus its sign. The unsigned sum of three magnitudes has the same
+    * width.
     */
   val edgeBits: Int = 2 * numbers.gridBits
 

@@ -23,9 +23,9 @@ final class TriangleSequencerIO(config: PartConfig) extends Bundle {
 
 /** Sequences the vertices of a leaf in a round: 4 slots for a triangle, 5 for a pair; docs/traversal.md, triangle test.
   *
-  * The gap frees the first register of the pipeline, so the last vertex never waits, and a round's end is known one cycle
-  * before. The next candidate is accepted with the last vertex, so no slot is lost between rounds. Without a record, a
-  * candidate is accepted in every second cycle.
+  * The gap frees the first register of the pipeline, so the last vertex never waits, and a round's end is known one
+  * cycle before. The next candidate is accepted with the last vertex, so no slot is lost between rounds. Without a
+  * record, a candidate is accepted in every second cycle.
   */
 final class TriangleSequencer(config: PartConfig) extends Module {
   val io = IO(new TriangleSequencerIO(config))

@@ -23,11 +23,11 @@ final private class PendingTriangle(config: PartConfig) extends Bundle {
 /** Watertight test of a ray against the triangles of a record (after Woop, Benthin and Wald 2013, in integers);
   * docs/traversal.md. The hit table compares the result with the closest hit so far.
   *
-  * Throughput: a pair every 5 cycles, a triangle every 4 cycles; one result for each triangle, in order. Latency of a miss:
-  * 11 cycles, in a pair 10 and 12. A triangle that the ray's line crosses takes about 30 cycles plus a quarter of
-  * the quotient's digits, one every 7 cycles or one per rotation of the dividers, whichever is longer.
-  * Sequencer, shear and edges stall together, when a triangle's edges are known and the next stage is full. The stages
-  * ahead share nothing with them, so these always make progress.
+  * Throughput: a pair every 5 cycles, a triangle every 4 cycles; one result for each triangle, in order. Latency of a
+  * miss: 11 cycles, in a pair 10 and 12. A triangle that the ray's line crosses takes about 30 cycles plus a quarter of
+  * the quotient's digits, one every 7 cycles or one per rotation of the dividers, whichever is longer. Sequencer, shear
+  * and edges stall together, when a triangle's edges are known and the next stage is full. The stages ahead share
+  * nothing with them, so these always make progress.
   *
   * A triangle in a plane through the ray misses.
   *

@@ -75,8 +75,8 @@ final class NumeratorStageIO(config: PartConfig) extends Bundle {
 
 /** Prepares the distance as a division of two mantissas; numbers.md 4.5.
   *
-  * One triangle at a time, every 7 cycles: four multiplications of a weight by half a rise, magnitude, leading zeros, and
-  * the shift in the output cycle.
+  * One triangle at a time, every 7 cycles: four multiplications of a weight by half a rise, magnitude, leading zeros,
+  * and the shift in the output cycle.
   */
 final class NumeratorStage(config: PartConfig) extends Module {
   val io = IO(new NumeratorStageIO(config))

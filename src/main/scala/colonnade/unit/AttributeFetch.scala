@@ -44,9 +44,9 @@ final class AttributeFetchIO(config: PathConfig) extends Bundle {
   val events = Output(new FetchEvents(AttributeFetch.slotConfig(config.device)))
 }
 
-/** Fetches the records of hits for a path unit: a leaf, or the leaf, its companion and the leaf again, which a buffer or
-  * a cache mostly still has. Hits wait in a queue for one of the slots, which are the contexts of a [[RecordFetch]]; so as
-  * many records as there are slots may be awaited. Responses come in any order.
+/** Fetches the records of hits for a path unit: a leaf, or the leaf, its companion and the leaf again, which a buffer
+  * or a cache mostly still has. Hits wait in a queue for one of the slots, which are the contexts of a [[RecordFetch]];
+  * so as many records as there are slots may be awaited. Responses come in any order.
   *
   * @param most maximum number of slots
   */

@@ -17,7 +17,8 @@ final class DeferredBounceIO(config: PathConfig) extends Bundle {
   val fresnelReflection = Valid(Context(config))
   val resume            = Flipped(Decoupled(new ResumedBounce(config)))
 
-  /** The Fresnel reflection, or the ray with which a path continues; whether it may march: the path has not gathered. */
+  /** The Fresnel reflection, or the ray with which a path continues; whether it may march: the path has not gathered.
+    */
   val ray     = Valid(new RayRequest(config))
   val marches = Output(Bool())
 }
@@ -50,11 +51,11 @@ final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val leaves       = new LeavingRays(config)
 }
 
-/** Issues bounces at mirrors and glass. In the same cycle, the colour unit gets the update of the path's throughput, and
-  * ray set-up gets the next ray, as long as the path has bounces left.
+/** Issues bounces at mirrors and glass. In the same cycle, the colour unit gets the update of the path's throughput,
+  * and ray set-up gets the next ray, as long as the path has bounces left.
   *
-  * With an environment, the Fresnel reflection of glass is resolved first. It takes the context, and the bounce waits in
-  * a table. Bounces from the table have priority; they are issued three cycles after `resume`.
+  * With an environment, the Fresnel reflection of glass is resolved first. It takes the context, and the bounce waits
+  * in a table. Bounces from the table have priority; they are issued three cycles after `resume`.
   */
 final class BounceScheduler(config: PathConfig) extends Module {
   val io = IO(new BounceSchedulerIO(config))

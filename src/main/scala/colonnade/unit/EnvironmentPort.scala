@@ -29,8 +29,8 @@ final class EnvironmentPortIO(config: PathConfig) extends Bundle {
   val marches = new MarchPort(config)
 }
 
-/** Routes rays to the marches of the environment: every ray that may miss the object is stored. A primary ray that cannot
-  * hit the object bypasses ray set-up. The ray of a hit that the environment may hide is marched too.
+/** Routes rays to the marches of the environment: every ray that may miss the object is stored. A primary ray that
+  * cannot hit the object bypasses ray set-up. The ray of a hit that the environment may hide is marched too.
   */
 final class EnvironmentPort(config: PathConfig) extends Module {
   val io = IO(new EnvironmentPortIO(config))

@@ -91,8 +91,8 @@ final class FetchStage(config: TraversalConfig) extends Module {
   private def isFor(kind: RecordKind.Type): Bool = recordFetch.io.response.valid && response.kind === kind
 }
 
-/** The rays of all contexts: what every test needs, and what only box tests or only triangle tests need. So a read moves
-  * 113 or 125 bits instead of 176 in `edge`.
+/** The rays of all contexts: what every test needs, and what only box tests or only triangle tests need. So a read
+  * moves 113 or 125 bits instead of 176 in `edge`.
   */
 private final class RayTable(config: TraversalConfig) {
   private val numbers      = config.numbers

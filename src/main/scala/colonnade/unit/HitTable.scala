@@ -117,8 +117,8 @@ final class HitLimitsIO(config: TraversalConfig) extends Bundle {
   val isHit  = Output(Bool())
 }
 
-/** Decides whether a result is a hit of its context's ray: not before its tMin, and of a triangle that it does not leave
-  * out. Combinational, from the ray that the context got last. Source: docs/numbers.md, section 9.
+/** Decides whether a result is a hit of its context's ray: not before its tMin, and of a triangle that it does not
+  * leave out. Combinational, from the ray that the context got last. Source: docs/numbers.md, section 9.
   */
 final class HitLimits(config: TraversalConfig) extends Module {
   val io = IO(new HitLimitsIO(config))

@@ -32,8 +32,8 @@ final class InstanceResultsIO(config: PathConfig) extends Bundle {
   val results = Valid(new TraceResult(config))
 }
 
-/** Compares the hits of a ray in one instance after the other: the nearest one stays, of equal ones the first. A result a
-  * cycle, of the traversal units before rays that miss.
+/** Compares the hits of a ray in one instance after the other: the nearest one stays, of equal ones the first. A result
+  * a cycle, of the traversal units before rays that miss.
   */
 final class InstanceResults(config: PathConfig) extends Module {
   private val numbers = config.numbers
@@ -146,8 +146,8 @@ final class WorldFaces(config: PathConfig) extends Module {
   private val vectors = 4
   private val stored  = vectors + 1
 
-  // A face, whose normals go round: the first one is multiplied, and comes back as the last one, of the world, two steps
-  // later. A face comes in the cycle after it may come
+  // A face, whose normals go round: the first one is multiplied, and comes back as the last one, of the world, two
+  // steps later. A face comes in the cycle after it may come
   private val face     = Reg(new HitFace(config))
   private val isHeld   = RegInit(false.B)
   private val step     = RegInit(0.U(log2Ceil(stored + 1).W))

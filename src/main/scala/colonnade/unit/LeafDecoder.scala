@@ -38,12 +38,9 @@ final class LeafDecoderIO(config: PathConfig) extends Bundle {
   val face        = Output(Valid(new HitFace(config)))
 }
 
-/** Finds the attributes of hits in leaves: a leaf every three cycles, and faces in the order of leaves, as the shader is
-  * ready. {{{
-  * leaf ─▶ vertices ─▶ GeometricNormalStage ─┬▶ queue ─▶ face
-  *           └─ codes ─▶ OctahedralDecoder ──┘
-  * }}}
-  * The stages never stall: a leaf enters only if the queue has a free entry.
+/** Finds the attributes of hits in leaves: a leaf every three cycles, and faces in the order of leaves, as the shader
+  * is ready. {{{ leaf ─▶ vertices ─▶ GeometricNormalStage ─┬▶ queue ─▶ face           └─ codes ─▶ OctahedralDecoder ──┘
+  * }}} The stages never stall: a leaf enters only if the queue has a free entry.
   */
 final class LeafDecoder(config: PathConfig) extends Module {
   import LeafDecoder._

@@ -46,8 +46,8 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val wantsColours = scene.hasColours.map(_ => Input(Vec(config.device.frame.materials, Bool())))
 }
 
-/** Stands between a path unit and the traversal units that trace its rays: forwards rays, keeps the hit of each context,
-  * and joins a hit that is to be shaded with its ray and its attributes.
+/** Stands between a path unit and the traversal units that trace its rays: forwards rays, keeps the hit of each
+  * context, and joins a hit that is to be shaded with its ray and its attributes.
   */
 final class PathHits(config: PathConfig) extends Module {
   private val paths = config

@@ -35,7 +35,9 @@ final private class GatheringPaths(config: PathConfig, io: GatherControl) extend
   private val isScattered = Reg(Vec(config.contexts, Bool()))
   private val count       = new FlagTable(config, UInt(Gather.countBits.W))
 
-  /** With an environment: the surface is of it; what the shadow rays of a point met, while its gathered rays are traced. */
+  /** With an environment: the surface is of it; what the shadow rays of a point met, while its gathered rays are
+    * traced.
+    */
   private val ofEnvironment = Option.when(config.device.hasEnvironment)(new FlagTable(config, Bool()))
   private val results       = Vec(config.device.frame.lights, UInt(Occlusion.getWidth.W))
   private val kept          = Option.when(config.device.hasEnvironment)(new FlagTable(config, UInt(results.getWidth.W)))
@@ -121,8 +123,8 @@ private[unit] final class ShadowProgress(config: PathConfig) {
   }
 }
 
-/** Flags of each context, written by one writer and read with choices: registers; or, of many contexts, a memory for each
-  * reader, since a choice is then known a cycle before.
+/** Flags of each context, written by one writer and read with choices: registers; or, of many contexts, a memory for
+  * each reader, since a choice is then known a cycle before.
   */
 private[unit] final class FlagTable(config: PathConfig, flags: UInt) {
   private val contexts  = config.contexts

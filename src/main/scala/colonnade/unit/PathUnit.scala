@@ -30,8 +30,8 @@ final class PathUnitIO(config: PathConfig) extends Bundle {
   val events            = Output(new PathEvents(config))
 }
 
-/** Follows the path of each pixel in flight, one per context: docs/path-tracer.md. Pixels leave in any order; their order
-  * depends on timing, their values do not.
+/** Follows the path of each pixel in flight, one per context: docs/path-tracer.md. Pixels leave in any order; their
+  * order depends on timing, their values do not.
   */
 final class PathUnit(config: PathConfig) extends Module {
   val io = IO(new PathUnitIO(config))

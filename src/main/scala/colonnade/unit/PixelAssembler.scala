@@ -21,8 +21,8 @@ final class PixelAssemblerIO(config: PathConfig) extends Bundle {
   val isIdle            = Output(Bool())
 }
 
-/** Keeps what each context knows of its pixel, and assembles the pixel when it is done. A context retires when its tables
-  * are read; the pixel follows one cycle later, into a queue that has space for it.
+/** Keeps what each context knows of its pixel, and assembles the pixel when it is done. A context retires when its
+  * tables are read; the pixel follows one cycle later, into a queue that has space for it.
   */
 final class PixelAssembler(config: PathConfig) extends Module {
   val io = IO(new PixelAssemblerIO(config))

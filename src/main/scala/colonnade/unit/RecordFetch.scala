@@ -5,12 +5,12 @@ import chisel3.util.{Mux1H, OHToUInt, PopCount, PriorityEncoderOH}
 import colonnade.common.TimingSlice
 import colonnade.config.PartConfig
 
-/** Fetches records for contexts: a small file of fill buffers with miss handling and snooping; docs/path-tracer.md, fetching
-  * records. A buffer is reserved before a read is requested, so a broadcast never stalls.
+/** Fetches records for contexts: a small file of fill buffers with miss handling and snooping; docs/path-tracer.md,
+  * fetching records. A buffer is reserved before a read is requested, so a broadcast never stalls.
   *
-  * A unit says one cycle ahead that it accepts a record (`readyNext`). A response comes at the earliest two cycles after the
-  * record's broadcast, or two cycles after the request if a buffer holds the record. With `units.extraSlices` it is three,
-  * or five.
+  * A unit says one cycle ahead that it accepts a record (`readyNext`). A response comes at the earliest two cycles
+  * after the record's broadcast, or two cycles after the request if a buffer holds the record. With `units.extraSlices`
+  * it is three, or five.
   */
 final class RecordFetch(config: PartConfig) extends Module {
   val io = IO(new RecordFetchIO(config))

@@ -6,10 +6,10 @@ import colonnade.common.TimingSlice
 import colonnade.config.PartConfig
 import colonnade.formats.{Banks, RecordBroadcast}
 
-/** Fill: a broadcast goes to the buffer that was reserved for it. With snooping it goes to an available buffer otherwise,
-  * if a context waits for it that finds it in no buffer. Every context that waits takes it from there; without snooping
-  * only the one that requested it. An extra slice registers broadcasts, and the comparison of their addresses; then no
-  * record is snooped for a context whose lookup has no result yet.
+/** Fill: a broadcast goes to the buffer that was reserved for it. With snooping it goes to an available buffer
+  * otherwise, if a context waits for it that finds it in no buffer. Every context that waits takes it from there;
+  * without snooping only the one that requested it. An extra slice registers broadcasts, and the comparison of their
+  * addresses; then no record is snooped for a context whose lookup has no result yet.
   *
   * @param row         of this unit
   * @param incoming    by bank
@@ -63,8 +63,8 @@ private[unit] final class RecordFill(
   val awaiting: Seq[Seq[Bool]] =
     buffers.map(buffer => brings(buffer.address).map(_ && buffer.state === BufferState.reserved)).transpose
 
-  /** The buffers that are available after the fills; by broadcast and buffer: the buffer takes the record; it is reserved for
-    * it; it would take it if a context missed it.
+  /** The buffers that are available after the fills; by broadcast and buffer: the buffer takes the record; it is
+    * reserved for it; it would take it if a context missed it.
     */
   val (stillAvailable, fills, reserved, free) =
     broadcasts.zip(snoopers.zip(awaiting)).foldLeft(

@@ -29,8 +29,8 @@ final class RecordLookupIO(config: PartConfig) extends Bundle {
 
 /** Lookup: compares the address of a new fetch with all buffers', once. Later only a fill or a new reservation
   * changes what a fetch finds. The matches come in the cycle after the fetch. Two extra slices make it the third cycle:
-  * behind the comparators, and behind the choice of the fetch's port. A buffer that takes another address meanwhile does
-  * not match.
+  * behind the comparators, and behind the choice of the fetch's port. A buffer that takes another address meanwhile
+  * does not match.
   */
 final class RecordLookup(config: PartConfig) extends Module {
   val io = IO(new RecordLookupIO(config))
@@ -92,10 +92,10 @@ final class RecordGrantIO(config: PartConfig) extends Bundle {
   val granted = Output(Valid(new RecordGrantee(config)))
 }
 
-/** Grant: serves the first ready context of the kind with the highest priority whose unit accepts a record. The choice is
-  * registered: it addresses the tables of the context in one cycle, and in the next one the record leaves its buffer. So
-  * the buffer may be replaced in that cycle. Triangles have priority, because the triangle unit starts only in every
-  * fourth cycle. Attributes are second and nodes last.
+/** Grant: serves the first ready context of the kind with the highest priority whose unit accepts a record. The choice
+  * is registered: it addresses the tables of the context in one cycle, and in the next one the record leaves its
+  * buffer. So the buffer may be replaced in that cycle. Triangles have priority, because the triangle unit starts only
+  * in every fourth cycle. Attributes are second and nodes last.
   */
 final class RecordGrant(config: PartConfig) extends Module {
   val io = IO(new RecordGrantIO(config))

@@ -6,9 +6,9 @@ import colonnade.common.TimingSlice
 import colonnade.config.PartConfig
 import colonnade.formats.RecordRequest
 
-/** Miss: requests the record of the first context whose record no buffer holds or awaits, and reserves a buffer for it. With
-  * snooping all contexts with its address expect it from then on. A record that comes in the same cycle needs no request. An
-  * extra slice lies behind the choice of the context; then no request is sent while any record comes.
+/** Miss: requests the record of the first context whose record no buffer holds or awaits, and reserves a buffer for it.
+  * With snooping all contexts with its address expect it from then on. A record that comes in the same cycle needs no
+  * request. An extra slice lies behind the choice of the context; then no request is sent while any record comes.
   *
   * @param matches     by context and buffer: the lookup finds its address in the buffer
   * @param isUnderWay  by context: the matches of its fetch are still to come
@@ -79,9 +79,9 @@ private[unit] final class RecordMiss(
   }
 }
 
-/** With a cache, a read may be answered "later": the record's broadcast follows without a request. Then the read's buffer is
-  * free again, and its contexts await the fill. If no buffer is available when it comes, they request the record once more,
-  * and pin their buffer. It stays reserved, so every context gets its record in the end.
+/** With a cache, a read may be answered "later": the record's broadcast follows without a request. Then the read's
+  * buffer is free again, and its contexts await the fill. If no buffer is available when it comes, they request the
+  * record once more, and pin their buffer. It stays reserved, so every context gets its record in the end.
   */
 private[unit] final class LaterRecords(
     fetches: Seq[ContextFetch],

@@ -8,11 +8,11 @@ import colonnade.shading.PathEnd
 
 import scala.collection.mutable
 
-/** Holds the state of every context and issues each one to its next stage, by the table of states in docs/path-tracer.md;
-  * contains no arithmetic.
+/** Holds the state of every context and issues each one to its next stage, by the table of states in
+  * docs/path-tracer.md; contains no arithmetic.
   *
-  * Contexts are tokens: there are `contexts` of them, so no queue for contexts overflows. In each cycle, at most one ended
-  * ray is resolved, one context leaves shadowTest, and one pixel retires; other transitions are independent.
+  * Contexts are tokens: there are `contexts` of them, so no queue for contexts overflows. In each cycle, at most one
+  * ended ray is resolved, one context leaves shadowTest, and one pixel retires; other transitions are independent.
   */
 final class RtController(config: PathConfig) extends Module {
   private val contexts = config.contexts
@@ -29,7 +29,8 @@ final class RtController(config: PathConfig) extends Module {
   private val isShadow  = Reg(Vec(contexts, Bool()))
   private val hasColour = Reg(Vec(contexts, Bool()))
 
-  /** The path has left no surface of the object: its ray is the primary one, or the first that it gathers in the room. */
+  /** The path has left no surface of the object: its ray is the primary one, or the first that it gathers in the room.
+    */
   private val isStraight = Reg(Vec(contexts, Bool()))
 
   /** The camera sees the environment directly in this pixel. */
@@ -107,8 +108,8 @@ final class RtController(config: PathConfig) extends Module {
   }
   move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
 
-  // Issue rays from surfaces: shadow rays, one light after the other, and rays that gather light. A Fresnel reflection has
-  // no shadow rays, so its previous ray is none
+  // Issue rays from surfaces: shadow rays, one light after the other, and rays that gather light. A Fresnel reflection
+  // has no shadow rays, so its previous ray is none
   private val isTested = isAt(ContextState.shadowTest)
   private val mayIssue = isTested.zip(isAt(ContextState.gatherPending)).map { case (isTested, gathers) =>
     isTested || (gather.isBuilt && gathers)
@@ -157,8 +158,8 @@ final class RtController(config: PathConfig) extends Module {
   when(isOfPoint && isScattered) { io.end.bits.occlusions := VecInit(gather.before(last, occlusions)) }
   move(io.end.fire, ending.bits, ContextState.accumulating)
 
-  // A path's colour is complete; or the light of a surface is added and the path gathers, or goes back to its point of the
-  // environment with what it has gathered, and the point is shaded again
+  // A path's colour is complete; or the light of a surface is added and the path gathers, or goes back to its point of
+  // the environment with what it has gathered, and the point is shaded again
   private val goesOn      = gather.isBuilt && io.continued.valid
   private val goesBack    = io.continued.bits.goesBack
   private val accumulated = Mux(goesOn, io.continued.bits.context, io.accumulated.bits)

@@ -36,9 +36,9 @@ final class TraversalUnitIO(config: TraversalConfig) extends Bundle {
   val events  = Output(new TraversalEvents(config))
 }
 
-/** Traces rays for a path unit. A ray takes an idle context, and leaves it when its result enters the queue of one result.
-  * The context that ended and has the lowest number goes first; a result every other cycle. There are only as many rays as
-  * contexts, and each one ends, so a unit becomes free as long as `results` are taken.
+/** Traces rays for a path unit. A ray takes an idle context, and leaves it when its result enters the queue of one
+  * result. The context that ended and has the lowest number goes first; a result every other cycle. There are only as
+  * many rays as contexts, and each one ends, so a unit becomes free as long as `results` are taken.
   */
 @instantiable
 final class TraversalUnit(config: TraversalConfig) extends Module {

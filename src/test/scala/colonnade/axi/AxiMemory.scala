@@ -10,8 +10,9 @@ object WriteOrder extends Enumeration {
   val any, addressAfterDataValid, dataAfterAddress, together, addressAfterLastBeat = Value
 }
 
-/** A memory at the pins of an AXI4 master, with random stalls and latencies. Checks that each valid holds with its payload
-  * until it is accepted, that no data are offered before their address, that bursts end with `last` and cross no 4 KB.
+/** A memory at the pins of an AXI4 master, with random stalls and latencies. Checks that each valid holds with its
+  * payload until it is accepted, that no data are offered before their address, that bursts end with `last` and cross
+  * no 4 KB.
   *
   * @param stall percentage of cycles in which a channel does not move
   * @param order of the writes

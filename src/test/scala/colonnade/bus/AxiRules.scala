@@ -15,8 +15,8 @@ object AxiRules {
     assert(!waited || channel.bits.asUInt === bits, s"$name does not change")
   }
 
-  /** Bursts that are under way at a write port whose memory answers when `answers`, and each burst once. Address and data
-    * of a burst are accepted in any order.
+  /** Bursts that are under way at a write port whose memory answers when `answers`, and each burst once. Address and
+    * data of a burst are accepted in any order.
     *
     * @return the bursts whose address has been accepted and that are not answered, and the address of the current beat
     */

@@ -58,8 +58,8 @@ private class ShellControlHarness(config: ColonnadeConfig, shell: ShellConfig) e
   errors           := control.errors.asUInt
 }
 
-/** A host that writes registers as [[ShellRegisters]] lets it, and a device, a writer, a loader and a bus of random speed.
-  * A reference follows the frame or load that runs.
+/** A host that writes registers as [[ShellRegisters]] lets it, and a device, a writer, a loader and a bus of random
+  * speed. A reference follows the frame or load that runs.
   */
 private class ShellControlBench(dut: ShellControlHarness, tileSize: Int, shell: ShellConfig, random: Random) {
   private val (port, layout) = (dut.io, new Packed(new FramebufferSettings))

@@ -110,9 +110,9 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
   }
 }
 
-/** Drives rows that request, withdraw and change addresses at any time, and banks that stall and respond at any time, in
-  * order. It observes one read of each bank, any that is accepted while the bank's bit of `observed` is set, up to its
-  * broadcast. With snooping, a row waits only for a record that is being read.
+/** Drives rows that request, withdraw and change addresses at any time, and banks that stall and respond at any time,
+  * in order. It observes one read of each bank, any that is accepted while the bank's bit of `observed` is set, up to
+  * its broadcast. With snooping, a row waits only for a record that is being read.
   */
 class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
   private val rows     = config.recordRequesters

@@ -9,8 +9,8 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Pixel, PixelPosition, RecordBroadcast, RecordFormats, RecordRequest, UnitPosition}
 import colonnade.unit.TraversalEvents
 
-/** Renders each pixel by a chain of records: the position names the first one, each record the next one, with random pauses.
-  * There is a pixel in flight for each row. With `shading.shadows` it hangs at [[FakePathTracer.hangsAt]]; with
+/** Renders each pixel by a chain of records: the position names the first one, each record the next one, with random
+  * pauses. There is a pixel in flight for each row. With `shading.shadows` it hangs at [[FakePathTracer.hangsAt]]; with
   * `shading.flat` it reports an illegal record for each pixel of column 5.
   */
 final class FakePathTracer(config: ColonnadeConfig) extends PathTracerModule(config) {

@@ -8,8 +8,8 @@ import colonnade.{Proofs, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import org.scalatest.flatspec.AnyFlatSpec
 
-/** Drives rays at any time into a [[RayBus]] with units that end their rays at any time and count their contexts. A unit
-  * that is free counts a ray in the cycle after it comes, as [[colonnade.unit.TraversalUnit]] does.
+/** Drives rays at any time into a [[RayBus]] with units that end their rays at any time and count their contexts. A
+  * unit that is free counts a ray in the cycle after it comes, as [[colonnade.unit.TraversalUnit]] does.
   */
 class RayBusProof(config: ColonnadeConfig) extends Module {
   private val rows     = config.array.rows

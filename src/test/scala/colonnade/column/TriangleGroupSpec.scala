@@ -75,8 +75,9 @@ class TriangleGroupSpec extends AnyFlatSpec with ChiselScalatestTester with Matc
     }
 }
 
-/** Drives [[TriangleGrants]] with rows that wait, and send what they may, at any time, and a queue that triangle units empty
-  * at any time. As in [[TriangleGroup]], the units take a record in the cycle after they announce it, and perhaps earlier.
+/** Drives [[TriangleGrants]] with rows that wait, and send what they may, at any time, and a queue that triangle units
+  * empty at any time. As in [[TriangleGroup]], the units take a record in the cycle after they announce it, and perhaps
+  * earlier.
   */
 class TriangleGrantsProof(count: Int) extends Module {
   private val dut   = Module(new TriangleGrants(count)).io

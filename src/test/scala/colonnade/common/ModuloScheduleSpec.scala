@@ -4,7 +4,8 @@ import chisel3._
 import chiseltest._
 import org.scalatest.flatspec.AnyFlatSpec
 
-/** Adds the three components of a vector that comes in cycles 0 to 2, multiplies the first two, and offers all again later.
+/** Adds the three components of a vector that comes in cycles 0 to 2, multiplies the first two, and offers all again
+  * later.
   */
 private class SumOfThree(readAt: Int, unitAt: Seq[Int]) extends Module {
   val vector  = IO(Input(Vec(3, UInt(8.W))))

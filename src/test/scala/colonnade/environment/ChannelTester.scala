@@ -130,8 +130,8 @@ object ChannelTester {
   }
 }
 
-/** Delays requests to an environment's maps, and their responses, at random. Without a valid response the port has noise,
-  * as it has the responses of other requesters in an array.
+/** Delays requests to an environment's maps, and their responses, at random. Without a valid response the port has
+  * noise, as it has the responses of other requesters in an array.
   */
 object SlowMaps {
 

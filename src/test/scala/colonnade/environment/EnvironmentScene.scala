@@ -10,8 +10,8 @@ import colonnade.formats.{AttributeMemories, BoundingPlaneEntry, Load, MapDescri
 import scala.util.Random
 
 /** A room with a box, encoded as planes in a map's tiles: floor, ceiling, three walls, the box's front and top. View
-  * space, metres. A tile is flat, or its cells have a quarter, an eighth or a sixteenth of its edge, as the planes need and
-  * the heap permits.
+  * space, metres. A tile is flat, or its cells have a quarter, an eighth or a sixteenth of its edge, as the planes need
+  * and the heap permits.
   */
 final class EnvironmentScene(config: ColonnadeConfig, random: Random) {
   import EnvironmentScene._

@@ -6,8 +6,8 @@ import colonnade.formats.EnvironmentView
 
 import scala.util.Random
 
-/** A ray in grid steps, with a direction of any length. A direct view comes from the camera through `pixel`. The object is
-  * `hitDistance` away.
+/** A ray in grid steps, with a direction of any length. A direct view comes from the camera through `pixel`. The object
+  * is `hitDistance` away.
   */
 final case class MarchCase(
     context:      Int,
@@ -94,8 +94,8 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
   def behindBox(camera: Camera): MarchCase =
     ray(camera, Seq(spread(0.3), 0.1, 3 + spread(0.2)), Seq(spread(0.1), 0.7 + spread(0.1), 1.0))
 
-  /** Origins within the environment, on its surfaces, just behind them, outside the view and behind the camera. Directions at
-    * random, along an axis, to the camera and away from it.
+  /** Origins within the environment, on its surfaces, just behind them, outside the view and behind the camera.
+    * Directions at random, along an axis, to the camera and away from it.
     */
   def inRoom(camera: Camera): MarchCase = {
     val from = random.nextInt(8) match {

@@ -140,7 +140,8 @@ final case class Outline(rect: Seq[Int], edges: Seq[(Int, Int, Int)]) {
 object Outline {
   private val noEdge = (0, 0, 0)
 
-  /** Half of its edges go through one of some pixels, where one step more or less decides; the others cut nothing off. */
+  /** Half of its edges go through one of some pixels, where one step more or less decides; the others cut nothing off.
+    */
   def random(random: Random, pixels: Seq[(Int, Int)], limit: Int): Outline = Outline(
     if (random.nextInt(8) == 0) Seq(9, 9, 9, 40)
     else Seq(random.nextInt(64), random.nextInt(64), limit - 9, limit - 1),

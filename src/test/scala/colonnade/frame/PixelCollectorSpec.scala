@@ -8,8 +8,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** Two sources that offer and a sink that accepts at any time. It observes one pixel, any that is accepted while `marks`
-  * is set, until it leaves.
+/** Two sources that offer and a sink that accepts at any time. It observes one pixel, any that is accepted while
+  * `marks` is set, until it leaves.
   */
 class PixelCollectorProof(config: ColonnadeConfig) extends Module {
   val offers = IO(Input(Vec(2, Bool())))

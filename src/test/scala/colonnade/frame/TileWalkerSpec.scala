@@ -13,8 +13,8 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def config(tileSize: Int, base: ColonnadeConfig = TestConfigs.tiny): ColonnadeConfig =
     base.copy(frame = base.frame.copy(tileSize = tileSize))
 
-  /** Walks tiles; returns positions in order of time, with whether they are rendered, and the cycles. `meets` is called with
-    * the flag of each pixel that is rendered.
+  /** Walks tiles; returns positions in order of time, with whether they are rendered, and the cycles. `meets` is called
+    * with the flag of each pixel that is rendered.
     */
   private def walk(
       dut:      TileWalker,

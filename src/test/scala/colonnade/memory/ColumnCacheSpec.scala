@@ -10,8 +10,8 @@ import org.scalatest.matchers.should.Matchers
 import scala.collection.mutable
 import scala.util.Random
 
-/** Every request is answered after two cycles, three with an extra slice, with its record or "later"; then a fill brings
-  * the record.
+/** Every request is answered after two cycles, three with an extra slice, with its record or "later"; then a fill
+  * brings the record.
   */
 class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "ColumnCache"

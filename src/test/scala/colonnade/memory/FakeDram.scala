@@ -97,8 +97,8 @@ class FakeDram(axi: AxiReadPort, config: ColonnadeConfig, random: Random, isShar
   }
 }
 
-/** Columns in front of a bank, each of which awaits at most one line. Every line that is announced must come whole, and at
-  * its time.
+/** Columns in front of a bank, each of which awaits at most one line. Every line that is announced must come whole, and
+  * at its time.
   *
   * @param requests by column
   * @param lines    by bus

@@ -9,8 +9,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.collection.mutable
 import scala.util.Random
 
-/** Each line that a column asks for is announced on its bus, with its records; it is read from DRAM once, and again only
-  * when it is not held.
+/** Each line that a column asks for is announced on its bus, with its records; it is read from DRAM once, and again
+  * only when it is not held.
   */
 class SharedCacheSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "SharedCache"

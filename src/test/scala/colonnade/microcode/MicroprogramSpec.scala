@@ -15,8 +15,8 @@ private object TestLabel {
 
 private case object ForeignLabel extends Label
 
-/** Outputs the operand and signals of each step. Step 1 waits for `go`, steps 2 and 3 follow, step 3 jumps back to 2 while
-  * `again`. Then two chains overlap: 10, 11, 12, and from the second cycle on 21, 22.
+/** Outputs the operand and signals of each step. Step 1 waits for `go`, steps 2 and 3 follow, step 3 jumps back to 2
+  * while `again`. Then two chains overlap: 10, 11, 12, and from the second cycle on 21, 22.
   */
 private class ProgramHarness(encoding: => StepEncoding) extends Module {
   import TestLabel._

@@ -7,8 +7,8 @@ import chiseltest._
 import scala.collection.mutable
 import scala.util.Random
 
-/** Drives a unit with one input and one output stream, with random stalls on both. Checks the protocol: an offered result
-  * does not change until it is taken.
+/** Drives a unit with one input and one output stream, with random stalls on both. Checks the protocol: an offered
+  * result does not change until it is taken.
   */
 object StreamTester {
 

@@ -8,8 +8,8 @@ import colonnade.formats.{Layout, LeafRecord, RecordFormats}
 import scala.collection.mutable
 import scala.util.Random
 
-/** Records of a tree over leaves, in which only what stays is written, vertices for them, and what the C of a target does
-  * with both.
+/** Records of a tree over leaves, in which only what stays is written, vertices for them, and what the C of a target
+  * does with both.
   *
   * @param leaves   vertices of each leaf, the fourth of a triangle -1
   * @param vertices position and normal of each

@@ -8,7 +8,8 @@ import org.scalatest.matchers.should.Matchers
 
 import scala.util.Random
 
-/** Nodes get the boxes of what was built last, up to a full stack; what does not fit is an error, and changes nothing. */
+/** Nodes get the boxes of what was built last, up to a full stack; what does not fit is an error, and changes nothing.
+  */
 class BoxStackSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "BoxStack"
 

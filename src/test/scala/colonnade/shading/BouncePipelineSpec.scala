@@ -9,7 +9,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.collection.mutable
 import scala.util.Random
 
-/** The pipeline finds what [[BounceUnit]] finds, which [[BounceUnitSpec]] compares with the same answers of the model. */
+/** The pipeline finds what [[BounceUnit]] finds, which [[BounceUnitSpec]] compares with the same answers of the model.
+  */
 class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
   import BounceStimulus.poke
 

@@ -203,8 +203,8 @@ final class BounceStimulus(config: ColonnadeConfig, random: Random) {
     )
   }
 
-  /** Along the normal. The product of normal and ray is a power of two, or a little more. The product of their lengths is
-    * less, without the bits that are dropped. So the mantissa of the quotient is a half, and the cosine is one.
+  /** Along the normal. The product of normal and ray is a power of two, or a little more. The product of their lengths
+    * is less, without the bits that are dropped. So the mantissa of the quotient is a half, and the cosine is one.
     */
   def perpendicular(): BounceCase = {
     def product(a: Seq[BigInt], b: Seq[BigInt]) = a.zip(b).map { case (x, y) => x * y }.sum.abs

@@ -121,7 +121,9 @@ final class ColourReference(
   private val one   = 4096
   private val white = 4095
 
-  /** Colours of the paths of one context, and the shadow ratios of those that have one. Paths end before the last event. */
+  /** Colours of the paths of one context, and the shadow ratios of those that have one. Paths end before the last
+    * event.
+    */
   def colours(events: Seq[ColourEvent]): Seq[(Xyz, Option[Xyz])] = {
     var throughput, radiance           = Seq.empty[Int]
     var surface                        = Option.empty[LitColours]

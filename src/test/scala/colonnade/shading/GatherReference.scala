@@ -15,8 +15,8 @@ object GatherReference {
     Seq(if (quarter == 1 || quarter == 2) -x else x, if (quarter >= 2) -y else y, z)
   }
 
-  /** The direction about an axis whose largest component has `shadeBits` bits, at rough metal with the width of its lobe,
-    * in units of 1/256; and for the geometric normal.
+  /** The direction about an axis whose largest component has `shadeBits` bits, at rough metal with the width of its
+    * lobe, in units of 1/256; and for the geometric normal.
     */
   def direction(axis: Seq[Int], faceForward: Seq[Int], shadeBits: Int, u: Int, v: Int, alpha: Option[Int]): Seq[Int] = {
     val frame           = new Frame(axis, shadeBits, u, v)
@@ -102,7 +102,9 @@ object GatherReference {
     (face * 16 + part(scaled((axis + 1) % 3))) * 16 + part(scaled((axis + 2) % 3))
   }
 
-  /** The sample point of a pixel: the xor of the columns of two generator matrices of Sobol's sequence, in Morton order. */
+  /** The sample point of a pixel: the xor of the columns of two generator matrices of Sobol's sequence, in Morton
+    * order.
+    */
   def pixel(x: Int, y: Int): (Int, Int) = {
     val dimensions = Seq(
       (Seq(1, 3), (m: Seq[Int]) => (m(0) ^ (m(0) << 2)) ^ (m(1) << 1)),

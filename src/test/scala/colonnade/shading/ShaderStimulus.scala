@@ -32,8 +32,8 @@ final case class EnvironmentPointCase(
 /** A light, in raw integers. */
 final case class LightSource(position: Seq[BigInt], colour: Seq[BigInt], reachMantissa: BigInt, reachExponent: Int)
 
-/** The shading registers in raw integers; the first `shining` lights are on. `cornerColoured` says which materials have corner
-  * colours, `textured` which have a texture.
+/** The shading registers in raw integers; the first `shining` lights are on. `cornerColoured` says which materials have
+  * corner colours, `textured` which have a texture.
   */
 final case class LightCase(
     sources:        Seq[LightSource],
@@ -195,8 +195,8 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
     }
   }
 
-  /** Products halfway between two grid steps, or next to that: by little, or by half of what the lowest digit holds. The
-    * offset's product too if it is odd.
+  /** Products halfway between two grid steps, or next to that: by little, or by half of what the lowest digit holds.
+    * The offset's product too if it is odd.
     */
   def halfway(): HitCase = {
     val fraction       = numbers.shearFraction - numbers.shadeBits

@@ -90,8 +90,8 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       for (emission <- material.emission; channel <- emission.channels) channel.poke(random.nextInt(4096))
     }
 
-  /** Lit surfaces and bounced rays of a unit, each in their order. Hits come after a promise, points at any time; the order
-    * of both is that of the inputs, so that a unit has only one of them to take.
+  /** Lit surfaces and bounced rays of a unit, each in their order. Hits come after a promise, points at any time; the
+    * order of both is that of the inputs, so that a unit has only one of them to take.
     */
   private def run(
       dut:    ShadersHarness,

@@ -64,8 +64,8 @@ final class TriangleStimulus(config: ColonnadeConfig, seed: Int) {
 
   def vertex: Seq[BigInt] = Seq.fill(3)(coordinate)
 
-  /** Any triangle, or one around a point: small, large, with an edge or vertex there, or with a right angle and legs that
-    * are powers of two, so that its weights add up to a little less than one as a ray along an axis sees it.
+  /** Any triangle, or one around a point: small, large, with an edge or vertex there, or with a right angle and legs
+    * that are powers of two, so that its weights add up to a little less than one as a ray along an axis sees it.
     */
   def triangle(point: Seq[BigInt]): TestTriangle = random.nextInt(10) match {
     case 0 => TestTriangle(Seq.fill(3)(vertex))
@@ -86,7 +86,8 @@ final class TriangleStimulus(config: ColonnadeConfig, seed: Int) {
       TestTriangle(random.shuffle(near :+ opposite))
   }
 
-  /** Two triangles with a common edge, most of them around a point; a few with an edge that is a point, or equal ones. */
+  /** Two triangles with a common edge, most of them around a point; a few with an edge that is a point, or equal ones.
+    */
   def pair(point: Seq[BigInt]): Seq[TestTriangle] = {
     val Seq(a, b, c) = triangle(point).vertices
     val d            = if (chance(2)) vertex else triangle(point).vertices.head

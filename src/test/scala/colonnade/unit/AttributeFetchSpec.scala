@@ -30,9 +30,9 @@ class AttributeFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     proveUntil(cycles = 9)(module(contexts = 3, slots = 2, hasColours = false))
 }
 
-/** Drives [[AttributeFetch]] with hits of any contexts at any time, one of a context at a time, legal and beyond the last
-  * record. One bank accepts reads and answers them in order at any time; records that others have read are broadcast
-  * between its answers. The shader accepts responses at any time.
+/** Drives [[AttributeFetch]] with hits of any contexts at any time, one of a context at a time, legal and beyond the
+  * last record. One bank accepts reads and answers them in order at any time; records that others have read are
+  * broadcast between its answers. The shader accepts responses at any time.
   */
 class AttributeFetchProof(config: ColonnadeConfig, slots: Int) extends Module {
   import AttributeFetchProof._

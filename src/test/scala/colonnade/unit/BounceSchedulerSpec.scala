@@ -11,8 +11,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** Each bounce updates its path and sends its ray once, in the same cycle; one with a Fresnel reflection does so when it
-  * resumes, and sends the reflection before.
+/** Each bounce updates its path and sends its ray once, in the same cycle; one with a Fresnel reflection does so when
+  * it resumes, and sends the reflection before.
   */
 class BounceSchedulerSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "BounceScheduler"

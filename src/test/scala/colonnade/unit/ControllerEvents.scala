@@ -97,7 +97,9 @@ private class ContextModel(lights: Int) {
   var mayBeHidden     = false
   var isOcclusionTest = false
 
-  /** Rays that its path has gathered; its surface is of the environment; the light of its surface is added, and then it gathers. */
+  /** Rays that its path has gathered; its surface is of the environment; the light of its surface is added, and then it
+    * gathers.
+    */
   var gathered        = 0
   var isOfEnvironment = false
   var gathers         = false

@@ -12,7 +12,9 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** Each primary ray goes to the object or past it, once, and every ray that may march is stored, beside those of bounces. */
+/** Each primary ray goes to the object or past it, once, and every ray that may march is stored, beside those of
+  * bounces.
+  */
 class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "EnvironmentPort"
 

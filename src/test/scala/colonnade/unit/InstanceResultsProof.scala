@@ -5,8 +5,8 @@ import chisel3.util.log2Ceil
 import colonnade.config.PathConfig
 import colonnade.shading.Occlusion
 
-/** Drives [[InstanceResults]] with rays of any context and any mask, which enter objects or miss them, and whose results
-  * come in any order, at any time: each visit is resolved once, by the next instance or by the ray's end.
+/** Drives [[InstanceResults]] with rays of any context and any mask, which enter objects or miss them, and whose
+  * results come in any order, at any time: each visit is resolved once, by the next instance or by the ray's end.
   *
   * @param limit cycles in which one of the contexts that have a result goes on
   */

@@ -58,8 +58,9 @@ private class InstanceWalkHarness(config: ColonnadeConfig) extends Module {
   results.bits          := walk.results.bits.asUInt
 }
 
-/** However traversal units accept rays and return results: each ray is traced in the instances whose boxes it enters, one
-  * after the other, ends once, and has the nearest hit, of equal ones that of the first instance; a shadow ray ends at an opaque triangle.
+/** However traversal units accept rays and return results: each ray is traced in the instances whose boxes it enters,
+  * one after the other, ends once, and has the nearest hit, of equal ones that of the first instance; a shadow ray ends
+  * at an opaque triangle.
   */
 class InstanceWalkSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Proofs {
   behavior of "InstanceWalk"

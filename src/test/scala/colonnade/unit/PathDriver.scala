@@ -10,7 +10,8 @@ import org.scalatest.Assertions._
 
 import scala.util.Random
 
-/** Gives a path unit or a path tracer the positions of a frame without an environment, in any order, and takes its pixels.
+/** Gives a path unit or a path tracer the positions of a frame without an environment, in any order, and takes its
+  * pixels.
   *
   * @param pixel the bits of `pixels`
   */

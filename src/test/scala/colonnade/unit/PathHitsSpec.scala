@@ -15,8 +15,8 @@ import org.scalatest.matchers.should.Matchers
 import scala.collection.mutable
 import scala.util.Random
 
-/** Each hit that is shaded comes with its own ray, details and attributes, however rays, results and records overtake each
-  * other.
+/** Each hit that is shaded comes with its own ray, details and attributes, however rays, results and records overtake
+  * each other.
   */
 class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "PathHits"
@@ -308,7 +308,8 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     }
   }
 
-  /** The face of a leaf by the model; the low bits of the face are those of its material, above them are its colours. */
+  /** The face of a leaf by the model; the low bits of the face are those of its material, above them are its colours.
+    */
   private def checkFace(leaf: BigInt, id: Int): Unit = {
     val words    = Seq.tabulate(LeafRecord.recordBits(config.geometry) / 32)(i => (leaf >> (32 * i)) & 0xffffffffL)
     val question = Seq(BigInt(id % 2) +: words)

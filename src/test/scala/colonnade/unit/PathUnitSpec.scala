@@ -50,8 +50,8 @@ private class PathUnitHarness(config: ColonnadeConfig) extends Module {
   hits.broadcasts := broadcasts
 }
 
-/** A path unit gives each pixel once, equal to the model's, however long its rays are under way and whichever of them ends
-  * first. `make test` has path units in path tracers.
+/** A path unit gives each pixel once, equal to the model's, however long its rays are under way and whichever of them
+  * ends first. `make test` has path units in path tracers.
   */
 class PathUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "PathUnit"

@@ -7,8 +7,8 @@ import colonnade.TestParts._
 import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.shading.{Occlusion, PathEnd}
 
-/** Drives an [[RtController]] with any events of its stages. A stage answers for each context that it holds once, at any
-  * time and in any order. A model of each path says where its context is, and what the controller has to do next.
+/** Drives an [[RtController]] with any events of its stages. A stage answers for each context that it holds once, at
+  * any time and in any order. A model of each path says where its context is, and what the controller has to do next.
   *
   * Rays that miss the object's box may have hits here: more than the stages do, and paths are shorter. Two contexts get
   * pixels; if there are more, the others stay idle.

@@ -5,8 +5,8 @@ import colonnade.environment.{EnvironmentScene, ViewCase}
 
 import scala.util.Random
 
-/** The environment of a small scene, with the camera of its maps. Pixels in a strip at the left and the top of the frame
-  * are marked as unable to show the object.
+/** The environment of a small scene, with the camera of its maps. Pixels in a strip at the left and the top of the
+  * frame are marked as unable to show the object.
   *
   * @param hasEnvironment the frame has an environment; otherwise only the maps are loaded
   * @param occlusion      the environment may hide the object, which is then larger, and partly behind the walls

@@ -67,7 +67,8 @@ object SmallFrame {
     new SmallFrame(config, scene.registers, scene.records, (wide, high))
 }
 
-/** The records of a scene, by banks of random latency, which read a record once for all who ask for it while it is read.
+/** The records of a scene, by banks of random latency, which read a record once for all who ask for it while it is
+  * read.
   *
   * @param firstRow row of the first one of the requests
   */

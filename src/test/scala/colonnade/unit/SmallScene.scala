@@ -7,8 +7,8 @@ import colonnade.formats.{Leaf => LeafFormats, LeafRecord, NodeRecord, Octahedra
 import scala.collection.mutable
 import scala.util.Random
 
-/** A few large triangles in the object's cube with a camera in front of it: records in the packer's layout, and registers.
-  * Nodes hold groups of leaves, split along x.
+/** A few large triangles in the object's cube with a camera in front of it: records in the packer's layout, and
+  * registers. Nodes hold groups of leaves, split along x.
   */
 final class SmallScene(
     config:        ColonnadeConfig,

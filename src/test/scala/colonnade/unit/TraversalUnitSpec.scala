@@ -15,8 +15,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.collection.mutable
 import scala.util.Random
 
-/** Each ray gets its closest hit, or what occludes it, once: that of a search through all triangles, whatever the latency of
-  * records and the order of results.
+/** Each ray gets its closest hit, or what occludes it, once: that of a search through all triangles, whatever the
+  * latency of records and the order of results.
   */
 class TraversalUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "TraversalUnit"

@@ -23,8 +23,8 @@ final class TriangleSearch(config: ColonnadeConfig, scene: SmallScene) {
     } yield address -> Triangle(Leaf.maxTriangles * address + k, leaf(1) == 1, corners)
   }
 
-  /** By ray, given by the fields of a [[colonnade.ray.PreparedRay]]: occlusion of a shadow ray, or the fields of its closest
-    * hit.
+  /** By ray, given by the fields of a [[colonnade.ray.PreparedRay]]: occlusion of a shadow ray, or the fields of its
+    * closest hit.
     */
   def hits(rays: Seq[Fields], among: Seq[Triangle]): Vector[(Occlusion.Type, Option[Fields])] = {
     val pairs   = for (ray <- rays; triangle <- among) yield forTriangles(ray) ++ triangle.vertices.flatten
