@@ -57,6 +57,18 @@ def test_a_part_grows_to_its_limit_and_no_further(repository: Path) -> None:
     assert done.returncode == 1 and done.stderr.startswith("lines: soc has 1 lines more than tools/lines.json allows")
 
 
+def test_long_lines_become_fewer_only(repository: Path) -> None:
+    (repository / "soc" / "a.py").write_text(f"{'é' * 120}\n{'é' * 121}\n")
+    done = lines(repository)
+    assert done.returncode == 1
+    said = "lines: 1 lines are longer than 120 columns, and tools/lines.json allows 0: break those of the change\n"
+    assert done.stderr == said
+    lines(repository, "--set")
+    assert lines(repository).returncode == 0
+    (repository / "soc" / "a.py").write_text("pass\n")
+    assert "fewer than tools/lines.json allows" in lines(repository).stderr
+
+
 def test_a_limit_falls_with_its_part(repository: Path) -> None:
     grown(repository, 350)
     lines(repository, "--set")
