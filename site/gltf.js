@@ -2,9 +2,8 @@
 // normals, colours and materials. Draco is not read.
 
 import { Corners } from "./corners.js";
-import { DRACO, INSTANCING, READ_EXTENSIONS } from "./gltfchecks.js";
 import { ClipReader, EYE, animationNames, firstAnimation } from "./gltfclip.js";
-import { COMPRESSION, GltfDocument, grouped } from "./gltfdocument.js";
+import { COMPRESSION, DRACO, GltfDocument, INSTANCING, grouped } from "./gltfdocument.js";
 import { GltfMaterials } from "./gltfmaterials.js";
 
 /** Largest magnitude of a transform's element, in the scene. */
@@ -21,15 +20,10 @@ const MOST_COPIES = 1 << 16;
  * moves it, null for none, the first that can unless given. Vertices of a mesh with a clip are where they are bound,
  * until they are at rest (coverage.js).
  */
-export function readGltf(bytes, name, files, chosen) {
-  const document = new GltfDocument(bytes, name, files);
+export function readGltf(library, bytes, name, files, chosen) {
+  const document = new GltfDocument(library, bytes, name, files);
   const { json } = document;
   const animation = chosen === undefined ? firstAnimation(json) : chosen;
-  for (const extension of json.extensionsRequired ?? []) {
-    if (COMPRESSION.includes(extension)) throw document.compressed(extension);
-    if (!READ_EXTENSIONS.includes(extension))
-      throw document.error(`it requires the glTF extension ${extension}, which is not supported: export it without`);
-  }
   const corners = new Corners();
   const materials = new GltfMaterials(document, corners.notes);
   const vertices = [];

@@ -155,7 +155,7 @@ export class GltfMaterials {
     const key = [source, wrapU, wrapV, isNearest].join();
     if (!this.places.has(key)) {
       this.places.set(key, this.textures.length);
-      this.textures.push({ picture: this.picture(source), wrapU, wrapV, isNearest });
+      this.textures.push({ picture: document.image(source), wrapU, wrapV, isNearest });
     }
     const { texCoord, offset = [0, 0], rotation = 0, scale = [1, 1] } = info.extensions?.KHR_texture_transform ?? {};
     if (![...offset, rotation, ...scale].every(Number.isFinite))
@@ -166,17 +166,5 @@ export class GltfMaterials {
       -sine * scale[0] * u + cosine * scale[1] * v + offset[1],
     ];
     return { texture: this.places.get(key), coordinates: `TEXCOORD_${texCoord ?? info.texCoord ?? 0}`, place };
-  }
-
-  /** The bytes of a picture's file; null if it is missing. */
-  picture(source) {
-    const { document } = this;
-    const { bufferView, uri } = document.entry("images", source);
-    if (bufferView !== undefined) {
-      const { buffer, byteOffset = 0, byteLength = 0 } = document.entry("bufferViews", bufferView);
-      return document.buffer(buffer).subarray(byteOffset, byteOffset + byteLength);
-    }
-    if (uri === undefined) throw document.error(`image ${source} has no picture: export it again`);
-    return document.file(uri, `image ${source}`);
   }
 }

@@ -26,7 +26,7 @@ export async function readMesh(
   let mesh;
   try {
     mesh = suffix.startsWith("gl")
-      ? await decodePictures(readGltf(bytes, name, files, animation), decodePicture)
+      ? await decodePictures(readGltf(library, bytes, name, files, animation), decodePicture)
       : await readPolygons(library, suffix, bytes, name, files, decodePicture);
   } catch (error) {
     // What the language throws on wrong offsets, lengths and fields

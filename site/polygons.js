@@ -9,13 +9,13 @@ const TEAPOT_LEVEL = 10;
 const MATERIAL_NUMBERS = 11;
 const [MISSING, UNKNOWN, DAMAGED] = [0, 1, 2];
 
-const ended = (text) => new TextEncoder().encode(`${text}\0`);
+export const ended = (text) => new TextEncoder().encode(`${text}\0`);
 
 /**
  * The name and the bytes of a dropped file that a mesh names, in its case or, if it is the only one, in any; without
  * bytes if there is none.
  */
-function fileOf(files, name) {
+export function fileOf(files, name) {
   const own = name.replaceAll("\\", "/").split("/").pop().trim();
   const alike = [...files.keys()].filter((key) => key.toLowerCase() === own.toLowerCase());
   const found = files.has(own) ? own : alike.length === 1 ? alike[0] : own;

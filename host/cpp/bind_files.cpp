@@ -9,6 +9,7 @@
 
 #include "binding.hpp"
 #include "mesh/files/files.hpp"
+#include "mesh/files/gltf_document.hpp"
 #include "mesh/teapot.hpp"
 
 using namespace nanobind::literals;
@@ -96,6 +97,71 @@ private:
     std::unique_ptr<mesh::MeshReader> reader_;
 };
 
+using GivenRows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+class GltfFile {
+public:
+    GltfFile(const nb::bytes& where, const std::string& kind) : document_(std::string(textOf(where)), kind) {}
+
+    void begin(const nb::bytes& data) {
+        kept_.push_back(data);
+        refuse(released([&] { return document_.begin(textOf(data)); }));
+    }
+    void checkExtensions() { refuse(document_.checkExtensions()); }
+    nb::bytes text() const { return nb::bytes(document_.text().data(), document_.text().size()); }
+
+    /// The elements of an accessor; None: the buffer is needed.
+    nb::object array(std::size_t index, const std::optional<GivenRows>& decoded, bool isWhole) {
+        require(index, mesh::gltf::GltfDocument::accessors);
+        mesh::gltf::Array array;
+        std::optional<mesh::gltf::Decoded> given;
+        if (decoded) given = {decoded->data(), decoded->shape(0), static_cast<int>(decoded->shape(1)), isWhole};
+        if (!isFound(document_.array(index, array, given ? &*given : nullptr))) return nb::none();
+        return array.isWhole ? filled<std::int64_t>(array) : filled<double>(array);
+    }
+    /// The bytes of a buffer view, such as a picture; None: the buffer is needed.
+    nb::object viewBytes(std::size_t index) {
+        require(index, mesh::gltf::GltfDocument::bufferViews);
+        std::string bytes;
+        return isFound(document_.viewBytes(index, bytes)) ? nb::object(bytesOf(bytes)) : nb::none();
+    }
+    /// The bytes of an image, or None, and its file, or None; None: the buffer is needed.
+    nb::object image(std::size_t index) {
+        require(index, mesh::gltf::GltfDocument::images);
+        std::string bytes;
+        std::optional<std::string> file;
+        if (!isFound(document_.image(index, bytes, file))) return nb::none();
+        return file ? nb::make_tuple(nb::none(), bytesOf(*file)) : nb::make_tuple(bytesOf(bytes), nb::none());
+    }
+    nb::bytes bufferFile() const { return bytesOf(document_.bufferFile.value_or("")); }
+    void give(const std::optional<nb::bytes>& data) {
+        if (data) kept_.push_back(*data);
+        refuse(document_.give(data ? std::optional(textOf(*data)) : std::nullopt));
+    }
+    nb::bytes refusal() const { return bytesOf(document_.refusal); }
+
+private:
+    static void refuse(bool isRead) {
+        if (!isRead) throw nb::value_error("the file is refused");
+    }
+    static bool isFound(mesh::gltf::Found found) {
+        refuse(found != mesh::gltf::Found::refused);
+        return found == mesh::gltf::Found::yes;
+    }
+    void require(std::size_t index, mesh::gltf::GltfDocument::List list) const {
+        if (index >= document_.count(list)) throw nb::index_error("no such entry");
+    }
+    template <class Value> static nb::object filled(const mesh::gltf::Array& array) {
+        Value* to;
+        auto result = makeArray<Value>({array.count, static_cast<std::size_t>(array.width)}, to);
+        released([&] { array.copy(to); });
+        return nb::cast(result);
+    }
+
+    mesh::gltf::GltfDocument document_;
+    std::vector<nb::bytes> kept_; ///< what the document refers to
+};
+
 using Given = nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 using GivenAlpha = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
@@ -166,6 +232,19 @@ void bind_files(nb::module_& module) {
         .def("finish", &MeshFile::finish, "pictures"_a)
         .def("losses", &MeshFile::losses)
         .def("refusal", &MeshFile::refusal);
+    nb::class_<GltfFile>(module, "GltfFile",
+                         "The document of a glTF file (mesh/files/gltf_document.hpp); a ValueError has the line "
+                         "`refusal`, and None the `buffer_file` to `give`.")
+        .def(nb::init<const nb::bytes&, const std::string&>(), "where"_a, "kind"_a)
+        .def("begin", &GltfFile::begin, "data"_a)
+        .def("check_extensions", &GltfFile::checkExtensions)
+        .def("text", &GltfFile::text)
+        .def("array", &GltfFile::array, "index"_a, "decoded"_a.none() = nb::none(), "is_whole"_a = false)
+        .def("view_bytes", &GltfFile::viewBytes, "index"_a)
+        .def("image", &GltfFile::image, "index"_a)
+        .def("buffer_file", &GltfFile::bufferFile)
+        .def("give", &GltfFile::give, "data"_a.none())
+        .def("refusal", &GltfFile::refusal);
     module.def("mask_of", &maskOf, "pixels"_a, "alpha"_a.none(), "height"_a, "width"_a,
                "The alpha of a texture by another picture, uint8 [height, width].");
     module.def("teapot", &teapot, "level"_a, "Vertices and faces of the teapot.");

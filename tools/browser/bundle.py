@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after the modules that they import.
 WORKER = (
-    *("design", "library", "corners", "gltfchecks", "gltfdocument", "photo", "surfaces", "coverage", "gltfmaterials"),
-    *("gltfclip", "gltf", "polygons", "meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),
+    *("design", "library", "corners", "photo", "surfaces", "coverage", "polygons", "gltfdocument", "gltfmaterials"),
+    *("gltfclip", "gltf", "meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),
 )
 PAGE = (
     *("camera", "design", "photo", "surfaces", "roomview", "path", "panels", "orbit", "queue", "renderer", "state"),

@@ -77,7 +77,8 @@ def _compile_module(
 
 def _compile(language: str, source: Path, options: tuple[str, ...]) -> Path:
     target = OBJECTS / f"{source.stem}.o"
-    size = ("-Os",) if source.stem in SMALL else ()
+    # zig takes -Oz for -Os
+    size = ("-Os", "-Xclang", "-Oz") if source.stem in SMALL and language == "c++" else ()
     zig(language, *TARGET, *options, *size, "-c", str(source), "-o", str(target))
     return target
 

@@ -112,8 +112,8 @@ def text_of(data: bytes) -> str:
     return data.removeprefix(codecs.BOM_UTF8).decode("utf-8", "surrogateescape")
 
 
-def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
-    """Parse a JSON document, whose strings may have ``max_text`` characters.
+def parse_json(data: bytes | str, what: str) -> Any:
+    """Parse a JSON document, whose strings may have `MAX_TEXT` characters.
 
     Raises:
         UserError: The document is not JSON in UTF-8, repeats a key, has a number that is too long or not finite, or is
@@ -136,11 +136,11 @@ def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
         raise UserError(f"{what} is nested too deeply: {MAX_DEPTH} levels at most") from None
     except ValueError as error:
         raise UserError(f"{what} is not JSON: {error}") from None
-    check_values(value, what, max_text)
+    check_values(value, what)
     return value
 
 
-def check_values(data: Any, what: str, max_text: int = MAX_TEXT) -> None:
+def check_values(data: Any, what: str) -> None:
     """Refuse a parsed document with too deep nesting, or with too long strings or numbers."""
     level = [data]
     for _ in range(MAX_DEPTH + 1):
@@ -150,8 +150,8 @@ def check_values(data: Any, what: str, max_text: int = MAX_TEXT) -> None:
                 below += value.values()
             elif isinstance(value, list):
                 below += value
-            elif isinstance(value, str) and len(value) > max_text:
-                raise UserError(f"{what} holds a text of {len(value):,} characters: {max_text:,} at most")
+            elif isinstance(value, str) and len(value) > MAX_TEXT:
+                raise UserError(f"{what} holds a text of {len(value):,} characters: {MAX_TEXT:,} at most")
             elif isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
                 raise UserError(f"{what} holds a number of more than {MAX_DIGITS} digits")
         if not below:

@@ -1,6 +1,9 @@
 #include "colonnade_read.h"
 
+#include <list>
+
 #include "mesh/files/files.hpp"
+#include "mesh/files/gltf_document.hpp"
 #include "mesh/teapot.hpp"
 
 using namespace colonnade;
@@ -10,8 +13,19 @@ namespace {
 std::unique_ptr<mesh::MeshReader> reader;
 std::string text;
 std::vector<double> materials;
+std::unique_ptr<mesh::gltf::GltfDocument> document;
+std::list<std::string> kept; // what the document refers to
+std::string content;
 
-const char* kept(const std::string& value) {
+std::uint32_t stateOf(mesh::gltf::Found found) {
+    text = found == mesh::gltf::Found::buffer ? *document->bufferFile : document->refusal;
+    return static_cast<std::uint32_t>(found);
+}
+colonnade_bytes bytesOf(mesh::Text of) {
+    return {reinterpret_cast<const std::uint8_t*>(of.data()), static_cast<std::uint32_t>(of.size())};
+}
+
+const char* keep(const std::string& value) {
     text = value;
     return text.c_str();
 }
@@ -31,7 +45,7 @@ const char* colonnade_read_begin(const char* format, const char* name, const std
 
 const char* colonnade_read_library(void) {
     std::string name;
-    return reader->nextLibrary(name) ? kept(name) : nullptr;
+    return reader->nextLibrary(name) ? keep(name) : nullptr;
 }
 
 const char* colonnade_read_materials(const char* name, const std::uint8_t* bytes, std::uint32_t count) {
@@ -83,7 +97,48 @@ const char* colonnade_read_finish(const std::int32_t* numbers, colonnade_read* t
 
 const char* colonnade_read_note(std::uint32_t index) {
     const std::vector<std::string> lines = reader->losses.lines();
-    return index < lines.size() ? kept(lines[index]) : nullptr;
+    return index < lines.size() ? keep(lines[index]) : nullptr;
+}
+
+const char* colonnade_gltf_begin(const char* name, const std::uint8_t* bytes, std::uint32_t count,
+                                 colonnade_bytes* json) {
+    document = std::make_unique<mesh::gltf::GltfDocument>(name);
+    kept.clear();
+    kept.emplace_back(bytes, bytes + count);
+    if (!document->begin(kept.front()) || !document->checkExtensions()) return document->refusal.c_str();
+    *json = bytesOf(document->text());
+    return nullptr;
+}
+
+std::uint32_t colonnade_gltf_array(std::uint32_t index, colonnade_array* to) {
+    static std::vector<double> values;
+    mesh::gltf::Array array;
+    const mesh::gltf::Found found = document->array(index, array);
+    if (found == mesh::gltf::Found::yes) {
+        values.resize(array.count * static_cast<std::size_t>(array.width));
+        array.copy(values.data());
+        *to = {static_cast<std::uint32_t>(array.count), static_cast<std::uint32_t>(array.width), array.isWhole,
+               values.data()};
+    }
+    return stateOf(found);
+}
+
+std::uint32_t colonnade_gltf_image(std::uint32_t index, colonnade_bytes* image) {
+    std::optional<std::string> file;
+    const mesh::gltf::Found found = document->image(index, content, file);
+    const std::uint32_t state = stateOf(found);
+    if (found != mesh::gltf::Found::yes) return state;
+    *image = bytesOf(content);
+    text = file.value_or("");
+    return file ? 3 : 0;
+}
+
+const char* colonnade_gltf_text(void) { return text.c_str(); }
+
+const char* colonnade_gltf_give(const std::uint8_t* bytes, std::uint32_t count) {
+    std::optional<mesh::Text> given;
+    if (bytes) given = kept.emplace_back(bytes, bytes + count);
+    return document->give(given) ? nullptr : document->refusal.c_str();
 }
 
 void colonnade_read_teapot(std::uint32_t level, colonnade_read* to) {

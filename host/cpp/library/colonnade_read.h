@@ -48,6 +48,34 @@ const char *colonnade_read_finish(const int32_t *numbers, struct colonnade_read 
 /* A line of what is lost of the file, NULL after the last one. */
 const char *colonnade_read_note(uint32_t index);
 
+/* The elements of an accessor of a glTF file, in rows, and whether they are integers. */
+struct colonnade_array {
+    uint32_t count, width, is_whole;
+    const double *values;
+};
+
+/* Bytes, which are valid until the next call. */
+struct colonnade_bytes {
+    const uint8_t *bytes;
+    uint32_t count;
+};
+
+/* Begins to read the document of a glTF file (mesh/files/gltf_document.hpp), and gives its JSON. */
+const char *colonnade_gltf_begin(const char *name, const uint8_t *bytes, uint32_t count, struct colonnade_bytes *json);
+
+/* The elements of an accessor that exists: 0; 1 is refused, 2 needs the buffer of a file, of which colonnade_gltf_text
+ * tells. */
+uint32_t colonnade_gltf_array(uint32_t index, struct colonnade_array *array);
+
+/* The bytes of an image that exists, in the same way; 3: it is in the file of colonnade_gltf_text. */
+uint32_t colonnade_gltf_image(uint32_t index, struct colonnade_bytes *image);
+
+/* The refusal, or the name of the file. */
+const char *colonnade_gltf_text(void);
+
+/* Gives the bytes of that buffer, NULL if it is missing. */
+const char *colonnade_gltf_give(const uint8_t *bytes, uint32_t count);
+
 /* The teapot of the host (mesh/teapot.hpp), plain. */
 void colonnade_read_teapot(uint32_t level, struct colonnade_read *surface);
 

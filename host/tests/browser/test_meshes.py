@@ -18,10 +18,6 @@ from colonnade.mesh.load import load_mesh
 
 pytestmark = NEEDS_MODULE
 
-#: What of an error is each reader's own: the remedy, and the words of a JSON parser.
-OWN = (("copy it beside the mesh", "drop it together with the mesh"),)
-PARSED = (" is not JSON: ", " is not UTF-8 text")
-
 
 def by_the_tab(folder: Path, files: dict[str, bytes]) -> dict[str, Any]:
     """What site/meshes.js reads, by name: an error, or the arrays of corners."""
@@ -38,14 +34,8 @@ def test_the_tab_and_the_host_refuse_the_same_files_in_the_same_words(tmp_path: 
         with pytest.raises(UserError) as caught:
             load_mesh(tmp_path / name)
         words = str(caught.value).replace(str(tmp_path / name), name)
-        for host, tab in OWN:
-            words = words.replace(host, tab)
         assert says in words, name
-        ours = found[name].get("error", "it was read")
-        for part in PARSED:
-            if part in words and says in part:
-                words, ours = words.partition(part)[0] + part, ours.partition(part)[0] + part
-        assert ours == words, name
+        assert found[name].get("error", "it was read") == words, name
 
 
 def test_the_tab_and_the_host_read_the_same_triangles(tmp_path: Path) -> None:

@@ -1,10 +1,12 @@
 // Reads any bytes as a mesh file: the first chooses the format, the rest is the file, and for OBJ with a zero byte then
-// its materials. A surface that is read is whole. tools/reader-fuzz runs it.
+// its materials. A surface that is read is whole, and so are the arrays of a glTF document, whose buffers of other
+// files are its own bytes. tools/reader-fuzz runs it.
 
 #include <cstdio>
 #include <cstdlib>
 
 #include "mesh/files/files.hpp"
+#include "mesh/files/gltf_document.hpp"
 
 using namespace colonnade::mesh;
 
@@ -54,14 +56,64 @@ void check(const FileSurface& surface) {
     }
 }
 
+/// Asks for something of a document until it needs no buffer; whether it is found.
+template <class Ask> bool found(gltf::GltfDocument& document, Text bytes, const Ask& ask) {
+    for (;;) {
+        const gltf::Found state = ask();
+        require((state == gltf::Found::refused) != document.refusal.empty(), "a refusal says nothing");
+        if (state != gltf::Found::buffer) return state == gltf::Found::yes;
+        require(document.give(bytes), "a buffer is not taken");
+    }
+}
+
+void readDocument(Text bytes) {
+    using Document = gltf::GltfDocument;
+    Document whole("file");
+    const bool isRead = whole.begin(bytes) && whole.checkExtensions();
+    require(isRead == whole.refusal.empty(), "a refusal says nothing, or what is read has one");
+    require(whole.refusal.find('\n') == std::string::npos, "a refusal has several lines");
+    if (!isRead) return;
+    const auto fresh = [&](auto&& use) {
+        Document document("file");
+        require(document.begin(bytes), "what was read is not read again");
+        use(document);
+    };
+    for (std::size_t index = 0; index < std::min<std::size_t>(whole.count(Document::accessors), 8); ++index)
+        fresh([&](Document& document) {
+            gltf::Array array;
+            const std::vector<double> decoded(9, 0.5);
+            const gltf::Decoded given{decoded.data(), 3, 3, index % 2 == 0};
+            for (const gltf::Decoded* const one : {static_cast<const gltf::Decoded*>(nullptr), &given}) {
+                if (!found(document, bytes, [&] { return document.array(index, array, one); })) return;
+                // Zeros take no bytes of a file
+                if (array.count > (1 << 16)) continue;
+                std::vector<double> values(array.count * static_cast<std::size_t>(array.width));
+                array.copy(values.data());
+                for (const double value : values)
+                    require(!array.isWhole || value == std::nearbyint(value) || one, "an integer has a fraction");
+            }
+        });
+    std::string content;
+    std::optional<std::string> file;
+    for (std::size_t index = 0; index < std::min<std::size_t>(whole.count(Document::images), 8); ++index)
+        fresh(
+            [&](Document& document) { found(document, bytes, [&] { return document.image(index, content, file); }); });
+    for (std::size_t index = 0; index < std::min<std::size_t>(whole.count(Document::bufferViews), 8); ++index)
+        fresh([&](Document& document) { found(document, bytes, [&] { return document.viewBytes(index, content); }); });
+}
+
 } // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static constexpr const char* formats[]{"obj", "ply", "stl", "off"};
     if (size == 0) return 0;
     const Text bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-    const std::size_t split = data[0] % 4 == 0 ? std::min(bytes.find('\0'), bytes.size()) : bytes.size();
-    const std::unique_ptr<MeshReader> reader = readerOf(formats[data[0] % 4], "file");
+    if (data[0] % 5 == 4) {
+        readDocument(bytes);
+        return 0;
+    }
+    const std::size_t split = data[0] % 5 == 0 ? std::min(bytes.find('\0'), bytes.size()) : bytes.size();
+    const std::unique_ptr<MeshReader> reader = readerOf(formats[data[0] % 5], "file");
     const bool isRead = read(*reader, bytes.substr(0, split), bytes.substr(std::min(split + 1, bytes.size())));
     require(isRead == reader->refusal.empty(), "a refusal says nothing, or what is read has one");
     require(reader->refusal.find('\n') == std::string::npos, "a refusal has several lines");

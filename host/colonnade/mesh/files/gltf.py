@@ -21,9 +21,8 @@ from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import cofactors, unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.clips.tracks import Animation
-from colonnade.mesh.files.gltf_checks import DRACO, INSTANCING, READ_EXTENSIONS
 from colonnade.mesh.files.gltf_clip import ClipReader
-from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
+from colonnade.mesh.files.gltf_document import COMPRESSION, DRACO, INSTANCING, GltfDocument
 from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.files.gltf_emission import emission_of, emission_pieces
 from colonnade.mesh.files.gltf_metal import metal_of, of_map
@@ -70,7 +69,7 @@ def read_gltf(
         UserError: The file is invalid, or requires an extension that is not supported.
     """
     document = GltfDocument(data, path, references)
-    _check_extensions(document)
+    document.check_extensions()
     textures = GltfTextures(document, references, losses)
     clip = None if animation is None else ClipReader(document, animation.name, losses, _source_of(animation))
     surfaces, parts = _parts(document, textures, losses, clip)
@@ -303,15 +302,6 @@ def _materials_of(
     return tuple(found), np.concatenate(numbers)
 
 
-def _check_extensions(document: GltfDocument) -> None:
-    required = document.json.get("extensionsRequired", [])
-    for name in required if isinstance(required, list) else []:
-        if name in COMPRESSION:
-            raise document.compressed(name)
-        if name not in READ_EXTENSIONS:
-            raise document.error(f"it requires the glTF extension {name}, which is not supported: export it without")
-
-
 def _count_other(document: GltfDocument, losses: Losses, is_animated: bool) -> None:
     """Count what the file holds beside meshes and materials."""
     json = document.json
@@ -366,7 +356,7 @@ def _primitive(
     if "POSITION" not in attributes:
         raise document.error("a primitive has no positions")
     arrays = compressed.arrays(primitive)
-    positions = arrays.attribute("POSITION").astype(np.float64)
+    positions = arrays.attribute("POSITION").astype(np.float64, copy=False)
     if positions.shape[1] != 3:
         raise document.error("the positions of a primitive are not of type VEC3: export it again")
     count = len(positions)
@@ -458,7 +448,7 @@ def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Ind
         return np.arange(count, dtype=np.int64)
     if values.shape[1] != 1 or values.dtype.kind not in "iu":
         raise document.error("the indices of a primitive are not whole numbers")
-    corners = values[:, 0].astype(np.int64)
+    corners = values[:, 0].astype(np.int64, copy=False)
     if len(corners) and int(corners.max()) >= count:
         raise document.error(
             f"a face names vertex {corners.max()}, which does not exist: its primitive has {count:,} vertices,"

@@ -9,8 +9,7 @@ from typing import Any
 import numpy.typing as npt
 
 from colonnade.mesh.files.draco import DracoMesh, decode_draco
-from colonnade.mesh.files.gltf_checks import DRACO
-from colonnade.mesh.files.gltf_document import GltfDocument
+from colonnade.mesh.files.gltf_document import DRACO, GltfDocument
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.mesh import losses as lost
 from colonnade.mesh.clips.clip import Nodes, rotations
-from colonnade.mesh.files.gltf_checks import INSTANCING
-from colonnade.mesh.files.gltf_document import GltfDocument
+from colonnade.mesh.files.gltf_document import INSTANCING, GltfDocument
 from colonnade.mesh.losses import Losses
 
 #: Components of the attributes of copies of a mesh.

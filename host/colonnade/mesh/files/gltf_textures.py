@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
@@ -128,21 +127,12 @@ class GltfTextures:
         return self._read[key]
 
     def _texture(self, source: int, wrap_u: Wrap, wrap_v: Wrap, is_nearest: bool) -> int | None:
-        image = self._document.entry("images", source)
-        name, uri = f"image {source}", image.get("uri")
-        if "bufferView" in image:
-            data = self._document.view_bytes(image["bufferView"])
-        elif isinstance(uri, str) and uri.startswith("data:"):
-            data = self._document.embedded(uri, name)
-        elif isinstance(uri, str):
-            name = unquote(uri)
-            found = self._references.picture(name, self._losses)
-            if found is None:
-                return None
-            data = found
-        else:
-            raise self._document.error(f"{name} has no picture: export it again")
-        return self.reader.read(data, name, (wrap_u, wrap_v), is_nearest)
+        data, file = self._document.image(source)
+        if file is not None:
+            data = self._references.picture(file, self._losses)
+        if data is None:
+            return None
+        return self.reader.read(data, f"image {source}" if file is None else file, (wrap_u, wrap_v), is_nearest)
 
     def _matrix(self, transform: Mapping[str, Any]) -> Floats:
         """A KHR_texture_transform: scale, then rotation, then offset."""

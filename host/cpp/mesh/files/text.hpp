@@ -96,6 +96,12 @@ private:
     bool joins_;
 };
 
+inline void appendUtf8(std::string& text, std::uint32_t code) {
+    const int more = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
+    text += static_cast<char>(more == 0 ? code : (0xf0 << (3 - more) & 0xff) | code >> 6 * more);
+    for (int shift = 6 * (more - 1); shift >= 0; shift -= 6) text += static_cast<char>(0x80 | (code >> shift & 0x3f));
+}
+
 /// The text of a file, UTF-16 if it begins with a mark of it; of others a mark of UTF-8 is left out. `buffer` holds a
 /// text that is translated.
 inline Text textOf(Text bytes, std::string& buffer) {
@@ -113,10 +119,7 @@ inline Text textOf(Text bytes, std::string& buffer) {
             code = 0x10000 + ((code & 0x3ff) << 10 | (next & 0x3ff));
             at += 2;
         } else if (code >> 11 == 0x1b) code = 0xfffd;
-        const int more = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
-        buffer += static_cast<char>(more == 0 ? code : (0xf0 << (3 - more) & 0xff) | code >> 6 * more);
-        for (int shift = 6 * (more - 1); shift >= 0; shift -= 6)
-            buffer += static_cast<char>(0x80 | (code >> shift & 0x3f));
+        appendUtf8(buffer, code);
     }
     return buffer;
 }
