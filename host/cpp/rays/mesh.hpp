@@ -37,14 +37,20 @@ public:
     const std::vector<mesh::Face>& faces() const { return faces_; }
     const FaceRecord& operator[](std::size_t index) const { return records_[index]; }
 
-    /// The distance of a face's corner from the longest edge.
-    double altitude(std::size_t index) const {
+    double longestEdge(std::size_t index) const {
         const std::array<mesh::Vector, 3>& corners = records_[index].corners;
         double longest = 0;
         for (int i = 0; i < 3; ++i) {
             const mesh::Vector edge = mesh::difference(corners[(i + 1) % 3], corners[i]);
             longest = std::max(longest, std::sqrt(dot(edge, edge)));
         }
+        return longest;
+    }
+
+    /// The distance of a face's corner from the longest edge.
+    double altitude(std::size_t index) const {
+        const std::array<mesh::Vector, 3>& corners = records_[index].corners;
+        const double longest = longestEdge(index);
         const mesh::Vector area =
             mesh::cross(mesh::difference(corners[1], corners[0]), mesh::difference(corners[2], corners[0]));
         return longest > 0 ? std::sqrt(dot(area, area)) / longest : 0;

@@ -254,7 +254,7 @@ int colonnade_rays_commit(colonnade_rays_scene* scene) {
         std::string tooCoarse;
         for (const auto& design : device.designs) {
             packed = std::make_unique<PackedScene>(*design, scene->meshes);
-            tooCoarse = packed->whyTooCoarse();
+            tooCoarse = packed->whyTooCoarse(&design != &device.designs.back());
             if (tooCoarse.empty()) break;
         }
         if (!tooCoarse.empty()) throw Failure(COLONNADE_RAYS_BAD_MESH, tooCoarse);

@@ -38,8 +38,11 @@ public:
         unit_ = 1 / quantised_.scale;
         edge_ = std::ldexp(unit_, design.format.vertexBits);
         std::size_t whole = 0;
-        for (std::size_t i = 0; i < faces_.faces().size(); ++i)
-            whole += faces_.altitude(i) > std::ldexp(edge_, thinLog);
+        for (std::size_t i = 0; i < faces_.faces().size(); ++i) {
+            const double altitude = faces_.altitude(i);
+            whole += altitude > std::ldexp(edge_, thinLog);
+            slivers_ += altitude < unit_ && altitude <= std::ldexp(faces_.longestEdge(i), sliverLog);
+        }
         dropped_ = whole - std::min(whole, quantised_.faces.size());
     }
 
@@ -47,11 +50,13 @@ public:
     /// them lines.
     std::size_t dropped() const { return dropped_; }
 
-    /// Why the grid is too coarse; nothing if it is not.
-    std::string whyTooCoarse() const {
+    /// Why the grid is too coarse; nothing if it is not. Slivers count while there is a finer grid to try: without them
+    /// the surface has cracks that are no wider.
+    std::string whyTooCoarse(bool hasFiner) const {
         const std::size_t count = faces_.faces().size();
         const bool isLost = count != 0 && quantised_.faces.empty();
-        if (!isLost && dropped_ <= count / droppedShare) return {};
+        const std::size_t counted = hasFiner ? dropped_ : dropped_ - std::min(dropped_, slivers_);
+        if (!isLost && counted <= count / droppedShare) return {};
         return (isLost ? "no face keeps an area at "
                        : std::to_string(dropped_) + " of " + std::to_string(count) + " faces vanish at ") +
                std::to_string(design_.format.vertexBits) +
@@ -121,6 +126,8 @@ private:
     static constexpr std::uint32_t noFace = UINT32_MAX;
     /// Of the faces, one in so many may vanish.
     static constexpr std::size_t droppedShare = 100;
+    /// A sliver's altitude is at most so much of its longest edge.
+    static constexpr int sliverLog = -12;
     static constexpr int maxBits = 24, thinLog = -36;
 
     void join(const std::vector<std::unique_ptr<MeshPart>>& meshes) {
@@ -194,6 +201,7 @@ private:
     MaskMap maskMap_;
     std::vector<std::uint8_t> masks_, isClear_; ///< of the faces; a leaf has the device's mask in place of a material
     std::size_t dropped_ = 0;
+    std::size_t slivers_ = 0; ///< that the grid may drop
     double unit_ = 0, edge_ = 0;
     packer::QuantisedMesh quantised_;
     bvh::Bvh tree_;

@@ -388,6 +388,16 @@ def test_a_scene_gets_the_bits_that_it_needs_or_is_refused() -> None:
         Scene(*with_far_triangle(1e8)).closest(rays)
 
 
+def test_slivers_that_vanish_are_told_and_refuse_no_scene() -> None:
+    """As of exported solids; a design of more bits is taken, if there is a choice."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, -1 - 1e-7, 0]])
+    mesh = corners, np.array([[0, 1, 2], [0, 2, 3], [0, 4, 1]])
+    assert Scene(*mesh).dropped == 0
+    scene = Scene(*mesh, "edge")
+    with pytest.warns(UserWarning, match="1 face vanishes on the design's grid"):
+        assert scene.closest([DOWN]).face[0] >= 0
+
+
 def test_faces_that_vanish_are_told() -> None:
     vertices, faces = mesh_of("sphere:4")
     thin = np.array([[0, 0, 0], [1, 0, 0], [1, 1e-9, 0]])
