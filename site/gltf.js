@@ -3,17 +3,12 @@
 
 import { Corners } from "./corners.js";
 import { ClipReader, EYE, animationNames, firstAnimation } from "./gltfclip.js";
-import { COMPRESSION, DRACO, GltfDocument, INSTANCING, grouped } from "./gltfdocument.js";
+import { COMPRESSION, DRACO, GltfDocument, grouped } from "./gltfdocument.js";
 import { GltfMaterials } from "./gltfmaterials.js";
 
-/** Largest magnitude of a transform's element, in the scene. */
-const MOST_TRANSFORM = 1e100;
 /** As host/colonnade/mesh/materials/texture.py. */
 const MOST_UV = 1e6;
 const [POINTS, TRIANGLES, FAN] = [0, 4, 6];
-/** Attributes of copies of a mesh, as host/colonnade/mesh/files/gltf_nodes.py. */
-const OF_COPIES = { TRANSLATION: [0, 0, 0], ROTATION: [0, 0, 0, 1], SCALE: [1, 1, 1] };
-const MOST_COPIES = 1 << 16;
 
 /**
  * A mesh, as of readMesh; `files` has the other dropped files by name. `chosen` is the number of the animation that
@@ -30,33 +25,19 @@ export function readGltf(library, bytes, name, files, chosen) {
   const left = { "point primitive": 0, "line primitive": 0 };
   const animations = animationNames(json);
   const clip = animation !== null ? new ClipReader(document, animation, corners.notes) : null;
-  for (const { index, node, matrix } of nodesOf(document, clip && corners.notes))
-    for (const primitive of document.entry("meshes", node.mesh).primitives ?? []) {
-      const before = vertices.length / 3;
-      if (
-        addPrimitive(document, primitive, clip ? EYE : matrix, {
-          corners,
-          materials,
-          vertices,
-          left,
-          isBent: Boolean(clip),
-        })
-      )
-        clip?.add(index, primitive, vertices.length / 3 - before);
-    }
+  for (const { index, matrices } of document.placements(Boolean(clip), corners.notes))
+    for (const primitive of document.entry("meshes", document.entry("nodes", index).mesh).primitives ?? [])
+      for (const matrix of clip ? [EYE] : matrices) {
+        const before = vertices.length / 3;
+        const into = { corners, materials, vertices, left, isBent: Boolean(clip) };
+        if (addPrimitive(document, primitive, matrix, into)) clip?.add(index, primitive, vertices.length / 3 - before);
+      }
   for (const [noun, count] of Object.entries(left))
     if (count > 0)
       corners.notes.add(`${grouped(count)} ${noun}${count > 1 ? "s are" : " is"} not shown: only faces are rendered`);
   if (!clip && (animations.length > 0 || json.skins)) corners.notes.add("animations and skins are left out");
   const mesh = corners.mesh(vertices);
-  const moved =
-    clip && mesh.faces.length > 0
-      ? clip.clip(
-          mesh.vertices,
-          (node, index) => partsOf(document, node, index),
-          (node, index) => matrixOf(document, node, index),
-        )
-      : null;
+  const moved = clip && mesh.faces.length > 0 ? clip.clip(mesh.vertices) : null;
   return {
     ...mesh,
     animations,
@@ -66,67 +47,6 @@ export function readGltf(library, bytes, name, files, chosen) {
     materials: materials.materials,
     textures: materials.textures,
   };
-}
-
-/**
- * The nodes with a mesh of the default scene, and their transforms to the scene; with `notes`, which take the loss,
- * none of its copies.
- */
-function* nodesOf(document, notes) {
-  const { scenes = [], nodes = [], scene = 0 } = document.json;
-  const children = new Set(nodes.flatMap((node) => node.children ?? []));
-  const roots =
-    scenes.length > 0
-      ? (document.entry("scenes", scene).nodes ?? [])
-      : [...nodes.keys()].filter((index) => !children.has(index));
-  const pending = roots.map((index) => ({ index, parent: EYE })).reverse();
-  let count = 0;
-  while (pending.length > 0) {
-    const { index, parent } = pending.pop();
-    const node = document.entry("nodes", index);
-    const finite = (matrix) => {
-      if (!matrix.every((value) => Math.abs(value) < MOST_TRANSFORM))
-        throw document.error(`the transform of node ${index} is not finite, or too large: export it again`);
-      return matrix;
-    };
-    const matrix = finite(multiply(parent, matrixOf(document, node, index)));
-    for (const child of [...(node.children ?? [])].reverse()) pending.push({ index: child, parent: matrix });
-    count += node.mesh === undefined ? 0 : copyCount(document, node);
-    if (count > MOST_COPIES)
-      throw document.error(`it has more than ${grouped(MOST_COPIES)} copies of meshes: leave some out, or join them`);
-    const copies = node.mesh === undefined ? [] : copiesOf(document, node, index);
-    if (notes && copies.length > 1) notes.add("copies of an animated mesh are not shown: its node has one");
-    for (const copy of notes ? copies.slice(0, 1).map(() => null) : copies)
-      yield { index, node, matrix: copy ? finite(multiply(matrix, copy)) : matrix };
-  }
-}
-
-/** The number of copies of a node's mesh that the first of their attributes states. */
-function copyCount(document, node) {
-  const extension = node.extensions?.[INSTANCING];
-  if (!extension) return 1;
-  const first = Object.keys(extension.attributes ?? {}).find((name) => name in OF_COPIES);
-  return first === undefined ? 0 : document.entry("accessors", extension.attributes[first]).count;
-}
-
-/** The transforms of copies of a mesh to their node, or null for the node alone. */
-function copiesOf(document, node, index) {
-  const extension = node.extensions?.[INSTANCING];
-  if (!extension) return [null];
-  const given = {};
-  for (const name in OF_COPIES)
-    if (name in (extension.attributes ?? {})) given[name] = document.array(extension.attributes[name]);
-  const arrays = Object.entries(given);
-  const count = arrays.reduce((largest, [, array]) => Math.max(largest, array.count), 0);
-  if (count === 0 || !arrays.every(([name, array]) => array.count === count && array.width === OF_COPIES[name].length))
-    throw document.error(`the copies of node ${index} (${INSTANCING}) are not valid: export it again`);
-  const part = (name, copy) => {
-    const width = OF_COPIES[name].length;
-    return given[name] ? [...given[name].values.subarray(width * copy, width * (copy + 1))] : OF_COPIES[name];
-  };
-  return Array.from({ length: count }, (_, copy) =>
-    composed(part("TRANSLATION", copy), unit(part("ROTATION", copy)), part("SCALE", copy)),
-  );
 }
 
 /** The triangles of a primitive's corners. */
@@ -241,70 +161,20 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
   return true;
 }
 
-// Matrices: 16 numbers, column by column
-
-/** Numbers of a node, or those that stand for them. */
-function numbersOf(document, node, index, name, otherwise) {
-  const values = node[name] === undefined ? otherwise : node[name];
-  if (
-    !Array.isArray(values) ||
-    values.length !== otherwise.length ||
-    !values.every((value) => typeof value === "number")
-  )
-    throw document.error(`the transform of node ${index} is not valid: export it again`);
-  return values;
-}
-
-/** The parts of a node's transform to its parent. */
-function partsOf(document, node, index) {
-  const part = (name, otherwise) => numbersOf(document, node, index, name, otherwise);
-  return {
-    translation: part("translation", [0, 0, 0]),
-    rotation: unit(part("rotation", [0, 0, 0, 1])),
-    scale: part("scale", [1, 1, 1]),
-  };
-}
-
-/** A node's transform to its parent. */
-function matrixOf(document, node, index) {
-  if (node.matrix !== undefined) return numbersOf(document, node, index, "matrix", EYE);
-  const { translation, rotation, scale } = partsOf(document, node, index);
-  return composed(translation, rotation, scale);
-}
-
-/** A quaternion scaled to length 1. */
-function unit(rotation) {
-  const length = Math.hypot(...rotation) || 1;
-  return rotation.map((value) => value / length);
-}
-
-/** The transform of a rotation, a unit quaternion, after a scale and before a translation. */
-function composed(translation, [x, y, z, w], scale) {
-  const columns = [
-    [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-    [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-    [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
-  ];
-  return [...columns.flatMap((column, axis) => [...column.map((value) => value * scale[axis]), 0]), ...translation, 1];
-}
-
-const multiply = (a, b) =>
-  Array.from({ length: 16 }, (_, i) =>
-    [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[4 * (i >> 2) + k], 0),
-  );
+// Matrices: 16 numbers, row by row
 
 const transform = (m, [x, y, z], w) =>
-  [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row] * w);
+  [0, 4, 8].map((row) => m[row] * x + m[row + 1] * y + m[row + 2] * z + m[row + 3] * w);
 
 function cofactors(m) {
   const minor = (row, column) => {
-    const at = (r, c) => m[4 * ((column + c) % 3) + ((row + r) % 3)];
+    const at = (r, c) => m[4 * ((row + r) % 3) + ((column + c) % 3)];
     return at(1, 1) * at(2, 2) - at(1, 2) * at(2, 1);
   };
-  return [0, 1, 2].flatMap((column) => [minor(0, column), minor(1, column), minor(2, column), 0]).concat([0, 0, 0, 1]);
+  return [0, 1, 2].flatMap((row) => [minor(row, 0), minor(row, 1), minor(row, 2), 0]).concat([0, 0, 0, 1]);
 }
 
 const determinant = (m) => {
   const c = cofactors(m);
-  return m[0] * c[0] + m[1] * c[1] + m[2] * c[2];
+  return m[0] * c[0] + m[4] * c[4] + m[8] * c[8];
 };

@@ -214,17 +214,8 @@ export class ClipReader {
     return values;
   }
 
-  /**
-   * The clip of vertices at these positions; `partsOf` and `matrixOf` give the transform of a node to its parent
-   * (gltf.js).
-   */
-  clip(positions, partsOf, matrixOf) {
-    const { nodes = [] } = this.document.json;
-    const parents = new Int32Array(nodes.length).fill(-1);
-    nodes.forEach(({ children = [] }, index) => children.forEach((child) => (parents[child] = index)));
-    const order = [...nodes.keys()].filter((index) => parents[index] < 0);
-    for (const index of order) order.push(...(nodes[index].children ?? [])); // it grows
-    const parts = nodes.map(partsOf);
+  /** The clip of vertices at these positions. */
+  clip(positions) {
     // Bones that move no vertex are left out
     const used = [...new Set(this.influences)].sort((a, b) => a - b);
     const bones = [...this.bones.values()];
@@ -234,12 +225,7 @@ export class ClipReader {
     const places = new Map(used.map((bone, place) => [bone, place]));
     return {
       name: this.name,
-      nodes: [
-        parents,
-        whole(order),
-        real(nodes.flatMap((node, index) => transposed(matrixOf(node, index)))),
-        ...["translation", "rotation", "scale"].map((name) => real(parts.flatMap((part) => part[name]))),
-      ],
+      nodes: this.document.nodes(),
       tracks: this.tracks,
       bones: [whole(used.map((bone) => bones[bone].joint)), real(used.flatMap((bone) => bones[bone].inverse))],
       vertices: [positions, whole(this.influences.map((bone) => places.get(bone))), real(this.shares)],

@@ -3,7 +3,6 @@
 import { ended, fileOf } from "./polygons.js";
 
 export const DRACO = "KHR_draco_mesh_compression";
-export const INSTANCING = "EXT_mesh_gpu_instancing";
 /** Extensions that compress the mesh, and are not supported. */
 export const COMPRESSION = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 const [FOUND, REFUSED, NEEDS_BUFFER] = [0, 1, 2];
@@ -63,6 +62,41 @@ export class GltfDocument {
     return this.library.withArrays([new Uint32Array(2)], (out) =>
       this.ask(() => this.library.wasm.colonnade_gltf_image(index, out)) === FOUND ? this.bytesAt(out) : this.file()[1],
     );
+  }
+
+  /** All nodes: parents, order, matrices row by row to the parents, translations, rotations and scales. */
+  nodes() {
+    const { wasm } = this.library;
+    return this.library.withArrays([new Uint32Array(7)], (out) => {
+      this.library.check(wasm.colonnade_gltf_nodes(out));
+      const [count, parents, order, ...parts] = new Uint32Array(wasm.memory.buffer, out, 7);
+      const whole = (from) => Int32Array.from(new BigInt64Array(wasm.memory.buffer, from, count), Number);
+      const real = (from, i) => new Float64Array(wasm.memory.buffer, from, [16, 3, 4, 3][i] * count).slice();
+      return [whole(parents), whole(order), ...parts.map(real)];
+    });
+  }
+
+  /**
+   * The numbers of the nodes with a mesh of the default scene, and the matrices of their copies to it, row by row; a
+   * node that is animated has one. `notes` take what is lost.
+   */
+  placements(isAnimated, notes) {
+    const { wasm } = this.library;
+    return this.library.withArrays([new Uint32Array(4)], (out) => {
+      this.ask(() => wasm.colonnade_gltf_placements(Number(isAnimated), out));
+      const [count, nodes, counts, matrices] = new Uint32Array(wasm.memory.buffer, out, 4);
+      let at = matrices;
+      const next = () => new Float64Array(wasm.memory.buffer, (at += 128) - 128, 16).slice();
+      const sizes = new Int32Array(wasm.memory.buffer, counts, count);
+      const found = Array.from(new Int32Array(wasm.memory.buffer, nodes, count), (index, i) => ({
+        index,
+        matrices: Array.from({ length: sizes[i] }, next),
+      }));
+      let line = 0;
+      for (let note = wasm.colonnade_gltf_note(line); note !== 0; note = wasm.colonnade_gltf_note(++line))
+        notes.add(this.library.text(note));
+      return found;
+    });
   }
 
   /** The state of a request when it has the buffers that it needs. */

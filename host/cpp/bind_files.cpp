@@ -9,7 +9,7 @@
 
 #include "binding.hpp"
 #include "mesh/files/files.hpp"
-#include "mesh/files/gltf_document.hpp"
+#include "mesh/files/gltf_nodes.hpp"
 #include "mesh/teapot.hpp"
 
 using namespace nanobind::literals;
@@ -29,6 +29,15 @@ template <class T, class Row> nb::object rowsOf(std::vector<Row>&& rows, std::in
     auto* own = new std::vector<Row>(std::move(rows));
     const nb::capsule owner(own, [](void* memory) noexcept { delete static_cast<std::vector<Row>*>(memory); });
     return nb::cast(Pixels<T>(reinterpret_cast<T*>(own->data()), shape.size(), shape.data(), owner));
+}
+
+/// Of each loss subject and verb in the singular and the plural, what is done instead, number and name.
+nb::list linesOf(const mesh::Losses& losses) {
+    nb::list found;
+    for (const mesh::Losses::Entry& entry : losses.entries)
+        found.append(
+            nb::make_tuple(entry.one, entry.several, bytesOf(entry.instead), entry.count, bytesOf(entry.name)));
+    return found;
 }
 
 class MeshFile {
@@ -77,13 +86,9 @@ public:
         found["textures"] = textures;
         return found;
     }
-    /// What is lost since the last call: subject and verb in the singular and the plural, what is done instead, number,
-    /// name.
+    /// What is lost since the last call.
     nb::list losses() {
-        nb::list found;
-        for (const mesh::Losses::Entry& entry : reader_->losses.entries)
-            found.append(
-                nb::make_tuple(entry.one, entry.several, bytesOf(entry.instead), entry.count, bytesOf(entry.name)));
+        nb::list found = linesOf(reader_->losses);
         reader_->losses.entries.clear();
         return found;
     }
@@ -133,6 +138,31 @@ public:
         if (!isFound(document_.image(index, bytes, file))) return nb::none();
         return file ? nb::make_tuple(nb::none(), bytesOf(*file)) : nb::make_tuple(bytesOf(bytes), nb::none());
     }
+    /// Parents, order, matrices to the parents, translations, rotations and scales of all nodes.
+    nb::tuple nodes() {
+        mesh::Nodes nodes;
+        refuse(mesh::gltf::NodeReader(document_).readAll(nodes));
+        return nb::make_tuple(arrayOf<std::int64_t>(nodes.parents, {}), arrayOf<std::int64_t>(nodes.order, {}),
+                              arrayOf<double>(nodes.matrices, {4, 4}), arrayOf<double>(nodes.translations, {3}),
+                              arrayOf<double>(nodes.rotations, {4}), arrayOf<double>(nodes.scales, {3}));
+    }
+    /// Each node with a mesh of the default scene, and its transforms to the scene; and losses. None: the buffer is
+    /// needed.
+    nb::object placements(bool isAnimated) {
+        std::vector<mesh::gltf::Placement> found;
+        mesh::Losses losses;
+        if (!isFound(mesh::gltf::NodeReader(document_).read(isAnimated, found, losses))) return nb::none();
+        nb::list placed;
+        for (const auto& [node, matrices] : found)
+            placed.append(nb::make_tuple(node, arrayOf<double>(matrices, {4, 4})));
+        return nb::make_tuple(placed, linesOf(losses));
+    }
+    /// The triangles of the default scene by the counts of accessors.
+    double triangles() {
+        const std::optional<double> count = mesh::gltf::NodeReader(document_).triangles();
+        refuse(count.has_value());
+        return *count;
+    }
     nb::bytes bufferFile() const { return bytesOf(document_.bufferFile.value_or("")); }
     void give(const std::optional<nb::bytes>& data) {
         if (data) kept_.push_back(*data);
@@ -141,6 +171,15 @@ public:
     nb::bytes refusal() const { return bytesOf(document_.refusal); }
 
 private:
+    template <class Value, class Row>
+    static nb::object arrayOf(const std::vector<Row>& rows, std::initializer_list<std::size_t> inner) {
+        std::vector<std::size_t> shape{rows.size()};
+        shape.insert(shape.end(), inner.begin(), inner.end());
+        auto* own = new std::vector<Row>(rows);
+        own->reserve(1);
+        const nb::capsule owner(own, [](void* memory) noexcept { delete static_cast<std::vector<Row>*>(memory); });
+        return nb::cast(Pixels<Value>(reinterpret_cast<Value*>(own->data()), shape.size(), shape.data(), owner));
+    }
     static void refuse(bool isRead) {
         if (!isRead) throw nb::value_error("the file is refused");
     }
@@ -242,6 +281,9 @@ void bind_files(nb::module_& module) {
         .def("array", &GltfFile::array, "index"_a, "decoded"_a.none() = nb::none(), "is_whole"_a = false)
         .def("view_bytes", &GltfFile::viewBytes, "index"_a)
         .def("image", &GltfFile::image, "index"_a)
+        .def("nodes", &GltfFile::nodes)
+        .def("placements", &GltfFile::placements, "is_animated"_a)
+        .def("triangles", &GltfFile::triangles)
         .def("buffer_file", &GltfFile::bufferFile)
         .def("give", &GltfFile::give, "data"_a.none())
         .def("refusal", &GltfFile::refusal);

@@ -86,9 +86,6 @@ INFLUENCES = Loss.of(
     "others count for little",
     "vertices with more than four joints",
 )
-BENT_COPIES = Loss.of(
-    "copy of an animated mesh", "not shown", "a node has one: give each a node", "copies of an animated mesh"
-)
 HOLES = Loss.of("polygon with holes", "not shown", "export triangles", "polygons with holes")
 BEAMS = Loss.of("beam lattice", "not shown", "only faces are rendered")
 MATERIAL_GROUPS = Loss.of(
@@ -196,6 +193,12 @@ class Losses:
     def _named(self, loss: Loss, count: int) -> str:
         name = one_line(self.names.get(loss, ""))
         return name and (f" ({name})" if count == 1 else f" (the first is {name})")
+
+    def take(self, counted: Iterable[tuple[str, str, bytes, int, bytes]]) -> None:
+        """Add what a reader of ``cpp/mesh/files`` has counted: the words of each kind, a number and a name."""
+        for one, several, instead, count, name in counted:
+            loss = Loss(one, several, instead.decode("utf-8", "surrogateescape"))
+            self.add(loss, count, name.decode("utf-8", "surrogateescape"))
 
     def update(self, others: Iterable[tuple[Loss, int]]) -> None:
         """Add several losses."""

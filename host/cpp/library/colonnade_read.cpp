@@ -3,7 +3,7 @@
 #include <list>
 
 #include "mesh/files/files.hpp"
-#include "mesh/files/gltf_document.hpp"
+#include "mesh/files/gltf_nodes.hpp"
 #include "mesh/teapot.hpp"
 
 using namespace colonnade;
@@ -16,6 +16,7 @@ std::vector<double> materials;
 std::unique_ptr<mesh::gltf::GltfDocument> document;
 std::list<std::string> kept; // what the document refers to
 std::string content;
+mesh::Losses documentLosses;
 
 std::uint32_t stateOf(mesh::gltf::Found found) {
     text = found == mesh::gltf::Found::buffer ? *document->bufferFile : document->refusal;
@@ -131,6 +132,43 @@ std::uint32_t colonnade_gltf_image(std::uint32_t index, colonnade_bytes* image) 
     *image = bytesOf(content);
     text = file.value_or("");
     return file ? 3 : 0;
+}
+
+const char* colonnade_gltf_nodes(colonnade_nodes* to) {
+    static mesh::Nodes nodes;
+    nodes = {};
+    if (!mesh::gltf::NodeReader(*document).readAll(nodes)) return document->refusal.c_str();
+    *to = {static_cast<std::uint32_t>(nodes.parents.size()),
+           nodes.parents.data(),
+           nodes.order.data(),
+           numbersOf<double>(nodes.matrices),
+           numbersOf<double>(nodes.translations),
+           numbersOf<double>(nodes.rotations),
+           numbersOf<double>(nodes.scales)};
+    return nullptr;
+}
+
+std::uint32_t colonnade_gltf_placements(std::uint32_t isAnimated, colonnade_placements* to) {
+    static std::vector<std::int32_t> numbers, counts;
+    static std::vector<mesh::Matrix> matrices;
+    std::vector<mesh::gltf::Placement> found;
+    documentLosses = {};
+    numbers.clear();
+    counts.clear();
+    matrices.clear();
+    const std::uint32_t state = stateOf(mesh::gltf::NodeReader(*document).read(isAnimated, found, documentLosses));
+    for (const mesh::gltf::Placement& one : found) {
+        numbers.push_back(one.node);
+        counts.push_back(static_cast<std::int32_t>(one.matrices.size()));
+        matrices.insert(matrices.end(), one.matrices.begin(), one.matrices.end());
+    }
+    *to = {static_cast<std::uint32_t>(numbers.size()), numbers.data(), counts.data(), numbersOf<double>(matrices)};
+    return state;
+}
+
+const char* colonnade_gltf_note(std::uint32_t index) {
+    const std::vector<std::string> lines = documentLosses.lines();
+    return index < lines.size() ? keep(lines[index]) : nullptr;
 }
 
 const char* colonnade_gltf_text(void) { return text.c_str(); }

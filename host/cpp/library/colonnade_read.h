@@ -70,6 +70,31 @@ uint32_t colonnade_gltf_array(uint32_t index, struct colonnade_array *array);
 /* The bytes of an image that exists, in the same way; 3: it is in the file of colonnade_gltf_text. */
 uint32_t colonnade_gltf_image(uint32_t index, struct colonnade_bytes *image);
 
+/* All nodes of a document: parents, order, and row by row matrices to the parents, translations,
+ * rotations and scales. */
+struct colonnade_nodes {
+    uint32_t count;
+    const int64_t *parents, *order;
+    const double *matrices, *translations, *rotations, *scales;
+};
+
+/* The nodes of the document. */
+const char *colonnade_gltf_nodes(struct colonnade_nodes *nodes);
+
+/* The nodes with a mesh of the default scene, and the matrices of their copies to it, row by row: of a node one follows
+ * the other. A node that is animated has one. Their losses are those of colonnade_gltf_note. */
+struct colonnade_placements {
+    uint32_t count;
+    const int32_t *nodes, *counts;
+    const double *matrices;
+};
+
+/* The placements of the document, in the way of colonnade_gltf_array. */
+uint32_t colonnade_gltf_placements(uint32_t is_animated, struct colonnade_placements *placements);
+
+/* A line of what is lost of the nodes, NULL after the last one. */
+const char *colonnade_gltf_note(uint32_t index);
+
 /* The refusal, or the name of the file. */
 const char *colonnade_gltf_text(void);
 

@@ -44,6 +44,21 @@ inline Matrix product(const Matrix& a, const Matrix& b) {
     return result;
 }
 
+/// The matrix of a translation after a rotation, of a unit quaternion, after a scale; `bottom` has its last row.
+inline Matrix matrixOf(const Vector& translation, const Quaternion& rotation, const Vector& scale,
+                       const Matrix& bottom) {
+    const auto [x, y, z, w] = rotation;
+    const double rows[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                               {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                               {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
+    Matrix matrix = bottom;
+    for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t j = 0; j < 3; ++j) matrix[4 * i + j] = rows[i][j] * scale[j];
+        matrix[4 * i + 3] = translation[i];
+    }
+    return matrix;
+}
+
 /// One property of one node over time.
 class Track {
 public:
@@ -206,20 +221,6 @@ struct Clip {
     }
 
 private:
-    static Matrix matrixOf(const Vector& translation, const Quaternion& rotation, const Vector& scale,
-                           const Matrix& bottom) {
-        const auto [x, y, z, w] = rotation;
-        const double rows[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
-                                   {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
-                                   {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
-        Matrix matrix = bottom;
-        for (std::size_t i = 0; i < 3; ++i) {
-            for (std::size_t j = 0; j < 3; ++j) matrix[4 * i + j] = rows[i][j] * scale[j];
-            matrix[4 * i + 3] = translation[i];
-        }
-        return matrix;
-    }
-
     /// The transforms of nodes to their parents.
     std::vector<Matrix> matricesAt(double time, bool before) const {
         Nodes moving = nodes;

@@ -107,7 +107,7 @@ def test_what_an_animation_does_not_show_is_noted(tmp_path: Path) -> None:
     document.json["animations"][0]["channels"].append({"sampler": 0, "target": {"path": "pointer"}})
     found = by_the_tab(tmp_path, {"a.gltf": document}, "small", [0])["a.gltf"]
     assert found["animations"] == ["bend"]
-    for words in ("copies of an animated mesh", "only channels of nodes and morph"):
+    for words in ("1 copy of an animated mesh is not shown", "only channels of nodes and morph"):
         assert any(words in note for note in found["notes"]), words
 
 

@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "mesh/files/files.hpp"
-#include "mesh/files/gltf_document.hpp"
+#include "mesh/files/gltf_nodes.hpp"
 
 using namespace colonnade::mesh;
 
@@ -93,6 +93,23 @@ void readDocument(Text bytes) {
                     require(!array.isWhole || value == std::nearbyint(value) || one, "an integer has a fraction");
             }
         });
+    fresh([&](Document& document) {
+        Nodes nodes;
+        if (!gltf::NodeReader(document).readAll(nodes)) return;
+        require(nodes.order.size() == nodes.parents.size() && nodes.matrices.size() == nodes.parents.size(),
+                "a node has no parent or matrix");
+    });
+    fresh([&](Document& document) { gltf::NodeReader(document).triangles(); });
+    fresh([&](Document& document) {
+        std::vector<gltf::Placement> placements;
+        Losses losses;
+        if (!found(document, bytes,
+                   [&] { return gltf::NodeReader(document).read(bytes.size() % 2 == 0, placements, losses); }))
+            return;
+        for (const gltf::Placement& one : placements)
+            for (const Matrix& matrix : one.matrices)
+                for (const double value : matrix) require(std::isfinite(value), "a transform is not finite");
+    });
     std::string content;
     std::optional<std::string> file;
     for (std::size_t index = 0; index < std::min<std::size_t>(whole.count(Document::images), 8); ++index)

@@ -26,7 +26,6 @@ from colonnade.mesh.files.gltf_document import COMPRESSION, DRACO, INSTANCING, G
 from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.files.gltf_emission import emission_of, emission_pieces
 from colonnade.mesh.files.gltf_metal import metal_of, of_map
-from colonnade.mesh.files.gltf_nodes import FAN, STRIP, TRIANGLES, mesh_nodes
 from colonnade.mesh.files.gltf_relief import relief_of
 from colonnade.mesh.files.gltf_textures import GltfTextures, TextureUse
 from colonnade.mesh.files.resolver import References
@@ -50,7 +49,8 @@ from colonnade.mesh.materials.texture import MAX_UV
 #: Materials of a file up to which those with a map have all of its roughnesses.
 _MAPPED_MATERIALS = 64
 
-_POINTS, _LINE_MODES = 0, (1, 2, 3)
+#: Modes of primitives.
+_POINTS, _LINE_MODES, _TRIANGLES, _STRIP, _FAN = 0, (1, 2, 3), 4, 5, 6
 
 
 def read_gltf(
@@ -184,7 +184,8 @@ def _parts(
     # Of surfaces that no texture or corner colours; metal by a map keeps these, too
     plain: set[tuple[Vector, float]] = set()
     triangles = 0
-    for index, node, matrices in mesh_nodes(document, losses, is_animated=clip is not None):
+    for index, matrices in document.placements(losses, is_animated=clip is not None):
+        node = document.entry("nodes", index)
         losses.add(skins, len(matrices) if clip is None and "skin" in node else 0)
         for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
             losses.add(lost.MORPHS, 0 if clip is not None else len(matrices) * len(primitive.get("targets", [])))
@@ -343,11 +344,11 @@ def _primitive(
         left: Triangles that they may have.
     """
     copies = len(matrices)
-    mode, attributes = primitive.get("mode", TRIANGLES), primitive.get("attributes", {})
+    mode, attributes = primitive.get("mode", _TRIANGLES), primitive.get("attributes", {})
     if mode == _POINTS or mode in _LINE_MODES:
         losses.add(lost.POINTS if mode == _POINTS else lost.LINES, copies)
         return None
-    if mode not in (TRIANGLES, STRIP, FAN):
+    if mode not in (_TRIANGLES, _STRIP, _FAN):
         raise document.error(f"a primitive has the unknown mode {mode}")
     for name in primitive.get("extensions", {}):
         if name in COMPRESSION and "bufferView" not in document.entry("accessors", attributes.get("POSITION")):
@@ -370,11 +371,11 @@ def _primitive(
         return np.asarray(values[:, :width], dtype=np.float64)
 
     corners = _corners(document, arrays, count)
-    mode = mode if arrays.mesh is None else TRIANGLES
+    mode = mode if arrays.mesh is None else _TRIANGLES
     own = _faces(corners, mode)
     if copies * len(own) > left:
         raise document.error(f"it has more than {MAX_TRIANGLES:,} triangles: leave some out")
-    losses.add(lost.SPARE_CORNERS, copies * (len(corners) % 3) if mode == TRIANGLES else 0)
+    losses.add(lost.SPARE_CORNERS, copies * (len(corners) % 3) if mode == _TRIANGLES else 0)
     width = arrays.attribute("COLOR_0").shape[1] if "COLOR_0" in attributes else 0
     colours, alphas = attribute("COLOR_0", max(width, 3)), None
     if colours is not None:
@@ -459,10 +460,10 @@ def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Ind
 
 def _faces(corners: Indices, mode: int) -> Indices:
     """The triangles of a primitive, int64 [m, 3]."""
-    if mode == TRIANGLES:
+    if mode == _TRIANGLES:
         return corners[: len(corners) // 3 * 3].reshape(-1, 3)
     start = np.arange(max(0, len(corners) - 2))
-    if mode == FAN:
+    if mode == _FAN:
         return np.stack([corners[start + 1], corners[start + 2], corners[np.zeros_like(start)]], axis=1)
     odd = start % 2
     return np.stack([corners[start], corners[start + 1 + odd], corners[start + 2 - odd]], axis=1)

@@ -18,7 +18,6 @@ from colonnade.mesh.clips.faces import ClipFaces
 from colonnade.mesh.clips.tracks import Track
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.gltf_draco import PrimitiveArrays
-from colonnade.mesh.files.gltf_nodes import all_nodes
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.surface import RawSurface
 
@@ -45,7 +44,7 @@ class ClipReader:
         self._document, self._losses, self._source = document, losses, source or document
         self._named = None if source is None else _nodes_by_name(document)
         self.name = animation
-        self._nodes = all_nodes(document)
+        self._nodes = document.nodes()
         self._missing: dict[str, None] = {}
         self._tracks = self._read_tracks(self._chosen(animation))
         self._bones: dict[tuple[int, bytes], int] = {}

@@ -12,7 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.mesh.clips.clip import Nodes
 from colonnade.mesh.files.resolver import References
+from colonnade.mesh.losses import Losses
 
 DRACO = "KHR_draco_mesh_compression"
 #: The extension of a node that has copies of its mesh.
@@ -85,6 +88,24 @@ class GltfDocument:
         self.entry("images", index)
         content, name = self._found(lambda: self._file.image(index))
         return content, None if name is None else os.fsdecode(name)
+
+    def nodes(self) -> Nodes:
+        """All nodes, those outside of the default scene, too."""
+        parents, order, *parts = self._tried(self._file.nodes)
+        return Nodes(tuple(parents.tolist()), tuple(order.tolist()), *parts)
+
+    def placements(self, losses: Losses, *, is_animated: bool) -> list[tuple[int, Floats]]:
+        """The nodes with a mesh of the default scene, by number, and their transforms to the scene, float64 [c, 4, 4].
+
+        A node has one for each copy of its mesh; if it is animated, one.
+        """
+        placed, lost = self._found(lambda: self._file.placements(is_animated))
+        losses.take(lost)
+        return list(placed)
+
+    def triangles(self) -> int:
+        """The triangles of the default scene, with all copies, by the counts of accessors."""
+        return int(self._tried(self._file.triangles))
 
     def _found(self, ask: Callable[[], _Result | None]) -> _Result:
         """What the reader finds when it has the buffers that it needs."""

@@ -10,13 +10,12 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.mesh.files.resolver import References
-from colonnade.mesh.losses import Loss, Losses
+from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.materials import KINDS, Alpha, MeshMaterial
 from colonnade.mesh.materials.surface import RawSurface
 from colonnade.mesh.materials.texture import Texture, Wrap
@@ -41,13 +40,13 @@ def read_polygons(data: bytes, path: Path, references: References, losses: Losse
             library = references.materials(os.fsdecode(name))
             file.give_library(*((None, b"") if library is None else (library[0], os.fsencode(library[1]))))
         pictures = file.pictures()
-        _count(file, losses)
+        losses.take(file.losses())
         read = [_read(textures, references, losses, os.fsdecode(name), clamped) for name, clamped in pictures]
         textures.count_losses()
         found = file.finish(read)
     except ValueError:
         raise UserError(file.refusal().decode("utf-8", "surrogateescape")) from None
-    _count(file, losses)
+    losses.take(file.losses())
     faces = found.pop("faces")
     own = {name: found[name] for name in ("normals", "colours", "uvs")}
     of_faces = found["face_materials"]
@@ -59,12 +58,6 @@ def read_polygons(data: bytes, path: Path, references: References, losses: Losse
         textures=tuple(_texture(textures.textures, *values) for values in found["textures"]),
         **own,
     )
-
-
-def _count(file: Any, losses: Losses) -> None:
-    for one, several, instead, count, name in file.losses():
-        loss = Loss(one, several, instead.decode("utf-8", "surrogateescape"))
-        losses.add(loss, count, name.decode("utf-8", "surrogateescape"))
 
 
 def _read(textures: TextureReader, references: References, losses: Losses, name: str, is_clamped: bool) -> int:

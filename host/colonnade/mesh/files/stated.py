@@ -9,7 +9,6 @@ from pathlib import Path
 from colonnade.common.input_files import read_input
 from colonnade.common.limits import MAX_MESH_BYTES
 from colonnade.mesh.files.gltf_document import GltfDocument
-from colonnade.mesh.files.gltf_nodes import triangles_of
 from colonnade.mesh.files.resolver import References
 
 #: Bytes before the facets of a binary STL file, and of a facet.
@@ -58,9 +57,9 @@ def _of_obj(path: Path) -> int:
 def _of_gltf(path: Path) -> int:
     head = _read(path, 20)
     if head[:4] != b"glTF" or len(head) < 20:
-        return triangles_of(GltfDocument(_read(path), path, References(path)))
+        return GltfDocument(_read(path), path, References(path)).triangles()
     (length,) = struct.unpack_from("<I", head, 12)
-    return triangles_of(GltfDocument(_read(path, 20 + length)[20:], path, References(path)))
+    return GltfDocument(_read(path, 20 + length)[20:], path, References(path)).triangles()
 
 
 _FORMATS = {

@@ -172,8 +172,7 @@ private:
     /// Whether no node has two parents or is in a cycle.
     bool hasTrees() {
         std::vector<JsonValue> nodes;
-        if (const JsonValue list = document_["nodes"])
-            list.each([&](JsonValue, JsonValue node) { return nodes.push_back(node), true; });
+        document_["nodes"].each([&](JsonValue, JsonValue node) { return nodes.push_back(node), true; });
         constexpr std::size_t none = ~std::size_t{0};
         std::vector<std::size_t> parents(nodes.size(), none);
         for (std::size_t number = 0; number < nodes.size(); ++number) {

@@ -96,21 +96,35 @@ public:
         if (!checks.pass())
             return refuseAs("mesh " + where_ + ": " +
                             (checks.isVersion1 ? version1 : checks.reason + ": export it again"));
-        for (const List list : {accessors, bufferViews, buffers, images})
-            if (const JsonValue entries = json_.root()[names[list]])
-                entries.each([&](JsonValue, JsonValue entry) { return lists_[list].push_back(entry), true; });
+        for (const List list : {accessors, bufferViews, buffers, images, nodes, meshes, scenes})
+            json_.root()[names[list]].each(
+                [&](JsonValue, JsonValue entry) { return lists_[list].push_back(entry), true; });
         return true;
     }
-    enum List { accessors, bufferViews, buffers, images };
+    enum List { accessors, bufferViews, buffers, images, nodes, meshes, scenes };
     /// The entries of a list.
     std::size_t count(List list) const { return lists_[list].size(); }
+    JsonValue at(List list, std::size_t index) const { return lists_[list][index]; }
+    /// The number of an entry of a list; none, and a refusal, if it does not exist.
+    std::optional<std::size_t> entry(List list, JsonValue index) {
+        if (index.isWhole() && index.number() < static_cast<double>(lists_[list].size()))
+            return static_cast<std::size_t>(index.number());
+        refuse(std::string(names[list]) + "[" + (index ? std::string(index.raw()) : "None") +
+               "] is used, but does not exist: export it again");
+        return {};
+    }
+    std::optional<std::size_t> defaultScene() {
+        const JsonValue scene = json_.root()["scene"];
+        return scene || count(scenes) == 0 ? entry(scenes, scene) : std::optional<std::size_t>(0);
+    }
+    bool refuse(const std::string& reason) { return refuseAs(kind_ + " " + where_ + ": " + reason); }
     /// The JSON.
     Text text() const { return json_.text; }
 
     /// Refuses a file that requires an extension that is not read.
     bool checkExtensions() {
         const JsonValue required = json_.root()["extensionsRequired"];
-        return !required || required.each([&](JsonValue, JsonValue one) {
+        return required.each([&](JsonValue, JsonValue one) {
             const std::string name = one.text();
             if (isOneOf(compression, name)) return refuseCompressed(name);
             return isOneOf(readExtensions, name) ||
@@ -198,7 +212,7 @@ private:
     static constexpr Component components[]{{5120, 1, true, 127},           {5121, 1, false, 255},
                                             {5122, 2, true, 32767},         {5123, 2, false, 65535},
                                             {5125, 4, false, 4294967295.0}, {5126, 4, false, 0}};
-    static constexpr Text names[]{"accessors", "bufferViews", "buffers", "images"};
+    static constexpr Text names[]{"accessors", "bufferViews", "buffers", "images", "nodes", "meshes", "scenes"};
     static constexpr struct {
         Text type;
         int width;
@@ -208,7 +222,6 @@ private:
         refusal = oneLine(line);
         return false;
     }
-    bool refuse(const std::string& reason) { return refuseAs(kind_ + " " + where_ + ": " + reason); }
     bool refuseCompressed(Text name) {
         return refuse("its meshes are compressed (" + std::string(name) + "): export it without compression");
     }
@@ -240,14 +253,6 @@ private:
         return true;
     }
 
-    /// The number of an entry of a list; none, and a refusal, if it does not exist.
-    std::optional<std::size_t> entry(List list, JsonValue index) {
-        if (index && index.number() < static_cast<double>(lists_[list].size()))
-            return static_cast<std::size_t>(index.number());
-        refuse(std::string(names[list]) + "[" + (index ? std::string(index.raw()) : "None") +
-               "] is used, but does not exist: export it again");
-        return {};
-    }
     static const Component* componentOf(JsonValue of) {
         const double number = of.wholeOf("componentType");
         for (const Component& one : components)
@@ -367,7 +372,7 @@ private:
     const std::string where_, kind_;
     Json json_;
     std::optional<Text> binary_;
-    std::vector<JsonValue> lists_[4];
+    std::vector<JsonValue> lists_[7];
     std::map<std::size_t, Text> buffers_;
     std::map<std::size_t, std::string> embedded_;
 };

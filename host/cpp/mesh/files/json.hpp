@@ -31,7 +31,8 @@ public:
     bool isNumber() const { return type() == 'i' || type() == 'r'; }
     /// Whether it is a whole number from 0 on that a double holds.
     bool isWhole() const { return type() == 'i' && number() >= 0 && number() < 0x1p53; }
-    double number() const { return *numberOf(raw()); }
+    double number() const { return numberOf(raw()).value_or(0); }
+    /// The text of a value, of none nothing.
     Text raw() const;
     /// The characters of a text.
     std::string text() const;
@@ -53,7 +54,7 @@ public:
             });
         return found;
     }
-    /// Calls `use` with each key, none in a list, and value, while it is true; whether it always was.
+    /// Calls `use` with each key, none in a list, and value, while it is true; whether it always was, as in no value.
     template <class Use> bool each(const Use& use) const;
 
 private:
@@ -266,9 +267,10 @@ private:
 };
 
 inline const JsonNode& JsonValue::node() const { return json_->nodes[at_]; }
-inline Text JsonValue::raw() const { return json_->text.substr(node().begin, node().length); }
+inline Text JsonValue::raw() const { return json_ ? json_->text.substr(node().begin, node().length) : Text(); }
 
 template <class Use> bool JsonValue::each(const Use& use) const {
+    if (!json_) return true;
     const std::size_t end = node().next;
     for (std::size_t at = at_ + 1; at < end;) {
         JsonValue key;

@@ -284,7 +284,7 @@ inline std::optional<double> numberOf(Text word) {
     }
     if (at != end) return {};
     if (value == 0) found = 0;
-    else if (isWhole && value <= std::uint64_t{1} << 53 && std::abs(exponent) <= 22)
+    else if (isWhole && value <= std::uint64_t{1} << 53 && exponent >= -22 && exponent <= 22)
         found = exponent < 0 ? static_cast<double>(value) / decimal::tens[-exponent]
                              : static_cast<double>(value) * decimal::tens[exponent];
     else if (isWhole && std::abs(exponent) <= 19) found = decimal::middle(value, static_cast<int>(exponent));
