@@ -55,7 +55,7 @@ lazy val colonnade = (project in file("."))
     // loops for minutes: the optimising compiler, which .jvmopts leaves out, halves their time.
     Test / fork := true,
     Test / javaOptions ++=
-      IO.readLines(baseDirectory.value / ".jvmopts").filter(_.startsWith("-")).filterNot(_.contains("TieredStopAtLevel")),
+      IO.readLines(baseDirectory.value / ".jvmopts").filter(_.startsWith("-")).filterNot(_.contains("Tiered")),
     Test / testForkedParallel := true,
     // The simulators are compiled with the flags of the specs, not with those of the user; and without optimisation:
     // compiling takes longer than the short simulations.

@@ -68,7 +68,8 @@ struct Announcement {
     bool isValid = false;
 };
 
-/// One bank of a column: column/ColumnBvhController.scala with memory/ColumnCache.scala, or with a memory of the whole scene.
+/// One bank of a column: column/ColumnBvhController.scala with memory/ColumnCache.scala, or with a memory of the whole
+/// scene.
 class ColumnBank {
 public:
     ColumnBank(const Design& design, int bank)

@@ -69,7 +69,7 @@ def test_copies_of_a_mesh_are_those_of_nodes_and_its_arrays_are_read_once(
     read.clear()
     (tmp_path / "a.gltf").write_bytes(READ["copies-100.gltf"])
     load_mesh(tmp_path / "a.gltf")
-    assert len(read) == 4  # positions and indices, of which all copies are made, translations and rotations
+    assert len(read) == 2  # positions and indices, of which all copies are made
 
 
 def test_normals_are_weighted_by_angle() -> None:
