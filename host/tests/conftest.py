@@ -23,8 +23,13 @@ if TYPE_CHECKING:
 
 MakeManifest = Callable[..., Manifest]
 
-# No property depends on the speed of the machine
-settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# No property depends on the speed of the machine. Every run of `make test` has the same examples, `make verify` others.
+settings.register_profile(
+    "any machine",
+    deadline=None,
+    derandomize="COLONNADE_MATRIX" not in os.environ,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("any machine")
 
 
