@@ -31,7 +31,7 @@ class FrameOutput:
 
     Attributes:
         cycles: Simulated clock cycles.
-        seconds: Seconds of host time.
+        seconds: CPU seconds.
         values: Read-only registers by name, read after the frame.
     """
 

@@ -83,7 +83,7 @@ class Simulated:
 
     Attributes:
         frames: One frame per set of registers.
-        cycles_per_second: Simulated clock cycles per second of host time, without loading.
+        cycles_per_second: Simulated clock cycles by a CPU second, without loading.
     """
 
     frames: list[Frame]
@@ -130,7 +130,7 @@ def simulate(
         early: Takes the pixels of the first frame, without counters, while the others are simulated.
 
     Returns:
-        Simulated clock cycles per second of host time, without loading.
+        Simulated clock cycles by a CPU second, without loading.
 
     Raises:
         UserError: The stalls include banks, and the design has no input for that.

@@ -58,7 +58,7 @@ class FrameReport:
         share: Position along the scene's motion, 0.0 to 1.0.
         time: Of a sequence's frame, seconds.
         seconds: Seconds of packing, building the simulator, and rendering.
-        simulated_cycles_per_second: Simulation speed of the RTL.
+        simulated_cycles_per_second: Simulation speed of the RTL, by a CPU second.
         bytes: Sizes of the encoded maps.
         frames: Reports of a sequence's frames; empty in the report of one frame.
         samples: Samples of a pixel.

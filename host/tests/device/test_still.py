@@ -10,6 +10,7 @@ import pytest
 from colonnade.design.generator import design_for
 from colonnade.device import simulator_build
 from colonnade.device.compiler import require_compiler
+from colonnade.device.harness_job import FrameOutput, parse_output
 from colonnade.device.verilator import run_program, write_job
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
@@ -114,7 +115,13 @@ def test_the_check_of_a_simulator_finds_a_unit_that_hears_no_input(tmp_path: Pat
     scene = Scene(MeshSource(name="teapot:4"))
     registers = frame_registers(scene, image.header, design.manifest, 32, 25)
     job, _ = write_job(tmp_path, design.manifest, image, [registers])
-    command = [str(simulator_build.build_simulator(design)), "--check", "64", "--deaf"]
+    program = str(simulator_build.build_simulator(design))
+
+    def simulated(*options: str) -> FrameOutput:
+        lines = run_program([program, "--check", "64", *options, job.name], tmp_path, lambda _: None)
+        return parse_output(lines)[0]
+
     with pytest.raises(RuntimeError, match="the simulator's models disagree on port"):
-        run_program([*command, "1", job.name], tmp_path, lambda _: None)
-    assert run_program([*command, "0", job.name], tmp_path, lambda _: None)[0].startswith("simulated")
+        simulated("--deaf", "1")
+    asleep, awake = simulated("--deaf", "0"), simulated("--awake", "1")
+    assert (asleep.cycles, asleep.values) == (awake.cycles, awake.values)

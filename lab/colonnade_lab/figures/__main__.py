@@ -15,7 +15,7 @@ from colonnade_lab.figures import pages, pictures
 from colonnade_lab.figures.catalog import catalog, selected
 from colonnade_lab.figures.data import commands_of, digest_table, problems, release_problems
 from colonnade_lab.figures.digests import emit
-from colonnade_lab.figures.measure import measure, require_libraries
+from colonnade_lab.figures.measure import cpu_seconds, measure, require_libraries
 
 
 def main() -> None:
@@ -59,7 +59,8 @@ def _measure(parts: tuple[str, ...], docs: Path, again: bool) -> None:
     if parts:
         for name, table in pages.tables_of(docs, [entry.name for entry in entries]):
             print(f"\n{name}\n{table}")
-    print(f"figures: {len(entries)} parts in {(time.monotonic() - begin) / 60:,.1f} minutes", flush=True)
+    minutes = (time.monotonic() - begin) / 60
+    print(f"figures: {len(entries)} parts in {minutes:,.1f} minutes, {cpu_seconds() / 60:,.1f} CPU minutes", flush=True)
 
 
 if __name__ == "__main__":

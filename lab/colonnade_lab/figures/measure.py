@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -50,7 +51,7 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
     head, is_modified = commit()
     digests = digests_of(entry)
     config = manifest_for(entry.config, entry.overrides).manifest.config
-    begin = time.monotonic()
+    begin, used = time.monotonic(), cpu_seconds()
     reports = {part: _report(entry, command) for part, command in entry.commands.items()}
     seconds = time.monotonic() - begin
     content = {
@@ -73,7 +74,13 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
     with replacing(docs / "data" / f"{entry.name}.json") as stream:
         stream.write(f"{record_lines(content)}\n".encode())
     declare_measured(docs, entry.name)
-    print(f"figures: {entry.name} took {seconds:,.0f} s", flush=True)
+    print(f"figures: {entry.name} took {seconds:,.0f} s, {cpu_seconds() - used:,.0f} CPU s", flush=True)
+
+
+def cpu_seconds() -> float:
+    """CPU seconds of the programs that were run and have ended."""
+    used = os.times()
+    return used.children_user + used.children_system
 
 
 def age(content: Mapping[str, Any]) -> str:

@@ -108,10 +108,18 @@ def _percent(share: float) -> str:
 
 
 def simulators(data: Data) -> str:
-    """Simulated cycles per second of `small` by what drives it and by the simulator."""
-    found = data.result("simulators")["simulators"]
-    rows = [[row["by"], row["simulator"], f"{row['cycles']:,}", f"{row['cycles_per_second']:,.0f}"] for row in found]
-    return markdown(["by", "simulator", "cycles", "cycles per second"], rows)
+    """Simulated cycles by a CPU second: of `small` by what drives it and by the simulator; of `edge`."""
+    found = data.result("simulators")
+    rows = [
+        [row["by"], row["simulator"], f"{row['cycles']:,}", f"{row['cycles_per_second']:,.0f}"]
+        for row in found["simulators"]
+    ]
+    sleep = found["sleep"]
+    rows += [
+        [f"`edge`, bunny, {name}", "Verilator 5.006", f"{sleep['cycles']:,}", f"{sleep[key]:,.0f}"]
+        for key, name in (("asleep", "idle units sleep"), ("awake", "none sleeps"))
+    ]
+    return markdown(["by", "simulator", "cycles", "cycles by a CPU second"], rows)
 
 
 def view(data: Data) -> str:

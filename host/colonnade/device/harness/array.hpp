@@ -193,6 +193,12 @@ public:
         }
     }
 
+    /// No unit or part sleeps.
+    void stayAwake() {
+        for (auto& unit : units_) unit.stayAwake();
+        for (Parts& parts : parts_) parts.each([](auto& part) { part.model.stayAwake(); });
+    }
+
     /// Throws if another evaluation after `settle` changes a coupled port, or what sleeps.
     void check() {
         for (std::size_t i = 0; i < units_.size(); ++i) {

@@ -6,8 +6,8 @@
 //   write ADDRESS VALUE      writes one register word
 //   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, and
 //                            writes its pixels (struct PixelBytes, row by row); WATCHDOG is in cycles, 0 for none;
-//                            prints "simulated CYCLES SECONDS", and for designs with a cache "value dram.beats N",
-//                            the beats of its DRAM port
+//                            prints "simulated CYCLES SECONDS", of the processor, and for designs with a cache
+//                            "value dram.beats N", the beats of its DRAM port
 //   read NAME ADDRESS WORDS  prints "value NAME VALUE"
 //
 // Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
@@ -16,12 +16,14 @@
 // PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
 // --deaf 1: a fault for tests: models that are not evaluated since they stand still do not hear their inputs.
+// --awake 1: models that stand still are evaluated too.
 // With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -64,7 +66,7 @@ constexpr std::uint64_t watchdogMargin = 100'000, watchdogs = 2;
 constexpr std::uint64_t freePeriods = 840;
 
 struct Options {
-    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64, deaf = 0;
+    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64, deaf = 0, awake = 0;
     std::string waveform;
     DramOptions dram;
 };
@@ -129,6 +131,7 @@ public:
 #else
         if (!options.waveform.empty()) throw std::runtime_error("this simulator was built without waveforms");
 #endif
+        if (options.awake != 0) array_.stayAwake();
         top_.reset = 1;
         for (int i = 0; i < 8; ++i) cycle();
         top_.reset = 0;
@@ -203,12 +206,12 @@ public:
         received_ = 0;
         isTraced_ = true;
         write(startAddress, 1);
-        const auto begun = std::chrono::steady_clock::now();
+        const std::clock_t begun = std::clock();
         const std::uint64_t first = cycles_;
 #ifdef DRAM_BUS_BYTES
         const std::uint64_t firstBeat = dram_.beats();
 #endif
-        auto lastReport = begun;
+        auto lastReport = std::chrono::steady_clock::now();
         quiet_ = 0;
         mayChangeRegisters_ = false;
         while (!top_.io_done) {
@@ -235,11 +238,11 @@ public:
         // The waveform includes the cycle in which `done` is high
         if (traces()) cycle();
         isTraced_ = false;
-        const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
+        const double seconds = static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC;
         std::ofstream(file, std::ios::binary)
             .write(reinterpret_cast<const char*>(pixels_.data()),
                    static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
-        std::cout << "simulated " << cycles_ - first << ' ' << seconds.count() << '\n';
+        std::cout << "simulated " << cycles_ - first << ' ' << seconds << '\n';
 #ifdef DRAM_BUS_BYTES
         std::cout << "value dram.beats " << dram_.beats() - firstBeat << '\n';
 #endif
@@ -380,6 +383,7 @@ int main(int argc, char** argv) try {
                                                        {"--burst", &options.memoryBurst},
                                                        {"--check", &options.checkInterval},
                                                        {"--deaf", &options.deaf},
+                                                       {"--awake", &options.awake},
                                                        {"--dram", &options.dram.latency},
                                                        {"--dram-interval", &options.dram.interval},
                                                        {"--dram-banks", &options.dram.banks},
