@@ -103,7 +103,9 @@ class Bench:
         file = self.folder / f"{name}.toml"
         file.write_text(text, encoding="utf-8")
         output = self.folder / name
-        self.call("colonnade", "explore", from_root(file), "--output", from_root(output))
+        # The page's cycles are the RTL's
+        backend = ("--backend", "rtl") if "[cycles]" in text else ()
+        self.call("colonnade", "explore", from_root(file), *backend, "--output", from_root(output))
         found = json.loads((output / "study.json").read_text(encoding="utf-8"))
         failed = [failure["reason"] for point in found["points"] for failure in point["failures"]]
         if failed:

@@ -63,11 +63,11 @@ def _benchmark() -> Scene:
 
 
 def _bench(preset: str, mirror: bool = False) -> Iterator[CountedFrame]:
-    """Frames of `colonnade bench`."""
-    report = _recorded(f"bench-{preset}")
+    """Frames of `colonnade bench`; of a preset with figures of two meshes also those of the others."""
+    report, others = _recorded(f"bench-{preset}"), _recorded("bench-others").get(preset, {"meshes": {}})
     manifest = manifest_for(preset).manifest
     size = (report["size"][0], report["size"][1])
-    for name, mesh in (report["mirror"] if mirror else report)["meshes"].items():
+    for name, mesh in ((report["mirror"] if mirror else report)["meshes"] | others["meshes"]).items():
         scene = _benchmark().with_mesh(name)
         if mirror:
             scene = replace(

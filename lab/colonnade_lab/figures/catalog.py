@@ -9,6 +9,7 @@ from typing import Any
 
 from colonnade.design.toolchain import project_root
 
+from colonnade_lab.evaluation.bench import MESHES
 from colonnade_lab.evaluation.light.user_rooms import REPORT as USERS_ROOMS
 from colonnade_lab.explore.cycle_errors import PARTS
 from colonnade_lab.explore.points import points_of
@@ -167,6 +168,20 @@ def _large() -> Entry:
     return Entry("bench-large", "edge", {"latency": (*command, "--json", REPORT), "banks": (*command, *banks)})
 
 
+#: Presets with a figure of two meshes alone, whose cycles of the others the cycle model is compared with.
+_OF_TWO = ("small", "tiny")
+
+
+def _others() -> Entry:
+    """The other meshes on the presets that have figures of two."""
+    meshes = [part for mesh in MESHES if mesh not in _TWO for part in ("--mesh", mesh)]
+    commands = {
+        config: ("colonnade", "bench", "--config", config, "--reuse", *meshes, "--no-mirror", "--json", REPORT)
+        for config in _OF_TWO
+    }
+    return Entry("bench-others", "small", commands, designs=tuple(map(Design, _OF_TWO)))
+
+
 def _paper_unit() -> Entry:
     """The paper's unit, which traces and shades by itself: the formats of `edge`, the functions of the paper's."""
     alone = ("triangleRows=1", "triangleLanes=1", "marches=1", "pathContexts=16", "rayInterval=32", "shadeInterval=128")
@@ -318,6 +333,7 @@ def catalog() -> dict[str, Entry]:
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),
         _area("tiny", "ASAP7"),
+        _others(),
         _area("traversal", "ASAP7", "--mesh", "armadillo"),
         _area("edge", "SKY130"),
         _bench("fpga", *_TWO, "--dram-latency", "15", "--dram-interval", "2"),

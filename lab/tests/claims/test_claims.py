@@ -78,7 +78,8 @@ class Recorded(Bench):
     def call(self, *command: str) -> None:
         self.commands.append(command)
         if command[:2] == ("colonnade", "explore"):
-            load_study(Path(command[2]))
+            study = load_study(Path(command[2])).study
+            assert ("--backend", "rtl") == command[3:5] or not study.cycles
         if command[0] == "colonnade":
             parse_colonnade([part for part in command[1:]])
         raise Differs("noted")
