@@ -169,7 +169,9 @@ object RandomMutants {
     Mutants.choice = Some(Mutants.Choice(seed = arguments(1).toInt, perFile = arguments(2).toInt))
     for (name <- arguments.drop(3) if !finished.contains(name)) {
       val suite = Class.forName(s"colonnade.$name").getDeclaredConstructor().newInstance().asInstanceOf[Suite]
-      val tests = suite.testNames.toSeq.flatMap(clean(suite, _)).sortBy(test => (test.isMatrix, test.seconds))
+      val (failing, good) = suite.testNames.toSeq.partitionMap(clean(suite, _))
+      failing.foreach(test => write("suite" -> name, "failing" -> test))
+      val tests = good.flatten.sortBy(test => (test.isMatrix, test.seconds))
       for (test <- tests)
         write("suite" -> name, "test" -> test.name, "matrix" -> test.isMatrix, "seconds" -> test.seconds)
       for (mutant <- tests.flatMap(_.mutants).distinct.sortBy(_.number); test <- tests if test.mutants(mutant)) {
@@ -184,18 +186,19 @@ object RandomMutants {
     }
   }
 
-  /** A test without a fault, if it simulates a circuit that has some; run twice, as the first time builds the
-    * simulator.
+  /** A test without a fault, if it simulates a circuit that has some; its name if it fails. Run twice, as the first time
+    * builds the simulator.
     */
-  private def clean(suite: Suite, name: String): Option[Test] = {
+  private def clean(suite: Suite, name: String): Either[String, Option[Test]] = {
     Mutants.present.clear()
-    require(passes(suite, name, 0, Long.MaxValue), s"$name fails without a fault")
-    Option.when(Mutants.present.nonEmpty) {
-      val start = SuiteSeconds.used()
-      passes(suite, name, 0, Long.MaxValue)
-      val isMatrix = suite.tags.get(name).exists(_.contains(Matrix.name))
-      Test(name, isMatrix, SuiteSeconds.used() - start, Mutants.cycles, Mutants.present.toSet)
-    }
+    if (!passes(suite, name, 0, Long.MaxValue)) Left(name)
+    else
+      Right(Option.when(Mutants.present.nonEmpty) {
+        val start = SuiteSeconds.used()
+        passes(suite, name, 0, Long.MaxValue)
+        val isMatrix = suite.tags.get(name).exists(_.contains(Matrix.name))
+        Test(name, isMatrix, SuiteSeconds.used() - start, Mutants.cycles, Mutants.present.toSet)
+      })
   }
 
   private def passes(suite: Suite, test: String, mutant: BigInt, limit: Long): Boolean = {

@@ -48,6 +48,8 @@ private class PathUnitHarness(config: ColonnadeConfig) extends Module {
   hits.results.bits  := results.bits.asTypeOf(hits.results.bits)
   requests :<>= hits.requests
   hits.broadcasts := broadcasts
+  for ((wants, material) <- hits.wantsColours.toSeq.flatten.zip(unit.registers.materials))
+    wants := material.hasCornerColours.getOrElse(false.B) || material.hasTexture.getOrElse(false.B)
 }
 
 /** A path unit gives each pixel once, equal to the model's, however long its rays are under way and whichever of them
