@@ -186,16 +186,15 @@ object RandomMutants {
     }
   }
 
-  /** A test without a fault, if it simulates a circuit that has some; its name if it fails. Run twice, as the first time
-    * builds the simulator.
+  /** A test without a fault, if it simulates a circuit that has some; its name if it fails. Its seconds are also those of
+    * its simulator, which tests of a suite may share: the first one builds it.
     */
   private def clean(suite: Suite, name: String): Either[String, Option[Test]] = {
     Mutants.present.clear()
+    val start = SuiteSeconds.used()
     if (!passes(suite, name, 0, Long.MaxValue)) Left(name)
     else
       Right(Option.when(Mutants.present.nonEmpty) {
-        val start = SuiteSeconds.used()
-        passes(suite, name, 0, Long.MaxValue)
         val isMatrix = suite.tags.get(name).exists(_.contains(Matrix.name))
         Test(name, isMatrix, SuiteSeconds.used() - start, Mutants.cycles, Mutants.present.toSet)
       })
