@@ -17,7 +17,7 @@ final class AdvancingRay(config: PathConfig) extends Bundle {
   val exponent    = Vec(2, UInt(formats.exponentBits.W))
   val origin      = Vec(3, new Fixed(formats.scene))
   val tMax        = UInt((config.numbers.sceneBits + 1).W)
-  val limits      = Option.when(config.device.frame.rays)(new RayLimits(config.numbers))
+  val limits      = QueryBits(config)(new RayLimits(config.numbers))
   val visit       = InstanceNumber(config.device).map(Valid(_))
 }
 

@@ -49,7 +49,7 @@ final class PermutedRay(config: PathConfig) extends Bundle {
   /** Largest t in grid steps; it saturates above the sum of an entry distance and the largest t of the grid. */
   val tMax = UInt((numbers.sceneBits + 1).W)
 
-  val limits = Option.when(config.device.frame.rays)(new RayLimits(numbers))
+  val limits = QueryBits(config)(new RayLimits(numbers))
 }
 
 final class DirectionNormaliserIO(config: PathConfig) extends Bundle {

@@ -33,6 +33,13 @@ final class RayFormats(numbers: NumberFormats) {
   val exponentBits: Int = NumberFormats.bitLength(numbers.reciprocalFraction)
 }
 
+/** What only rays of applications carry, and what only their hits tell, from ray set-up to the results: units pass on
+  * what there is, as the user bits of a bus. None in a design without such rays.
+  */
+object QueryBits {
+  def apply[T <: Data](config: PartConfig)(bits: => T): Option[T] = Option.when(config.device.frame.rays)(bits)
+}
+
 /** A ray to prepare. `dir` is its direction, of any length. A shadow ray ends at origin + dir, the light. */
 final class RayRequest(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
@@ -41,7 +48,7 @@ final class RayRequest(config: PathConfig) extends Bundle {
   val isShadow = Bool()
   val origin   = Vec3(new Fixed(new RayFormats(numbers).scene))
   val dir      = Vec3(SInt(numbers.directionBits.W))
-  val limits   = Option.when(config.device.frame.rays)(new RayLimits(numbers))
+  val limits   = QueryBits(config)(new RayLimits(numbers))
   val visit    = Option.when(config.device.frame.hasInstances)(Valid(new VisitLimit(config)))
 
   /** Marks a ray of the world. */
@@ -149,7 +156,7 @@ final class PreparedRay(config: PartConfig) extends Bundle {
   val ray      = new TracedRay(numbers)
   val tEntry   = new Fixed(formats.entry)
   val tMax     = new Fixed(formats.grid) // hits with t < `tMax` count; never negative
-  val limits   = Option.when(config.device.frame.rays)(new EntryLimits(numbers))
+  val limits   = QueryBits(config)(new EntryLimits(numbers))
 
   /** The instance in whose axes the ray is; none: the world's axes. */
   val visit = InstanceNumber(config.device).map(Valid(_))

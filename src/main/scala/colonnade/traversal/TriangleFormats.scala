@@ -5,7 +5,7 @@ import colonnade.common.Context
 import colonnade.config.{NumberFormats, PartConfig}
 import colonnade.formats.{LeafRecord, RecordFormats}
 import colonnade.numbers.{Fixed, FixedPointFormat, Normalise}
-import colonnade.ray.{RayFormats, TriangleRay}
+import colonnade.ray.{QueryBits, RayFormats, TriangleRay}
 
 /** Widths between the stages of the triangle test; docs/numbers.md, section 4. A depth is a vertex's z in the ray's
   * frame. A rise is the depth of vertex 1 or 2 minus vertex 0's.
@@ -82,7 +82,7 @@ final class TriangleTag(config: PartConfig) extends Bundle {
   val isPair         = Bool()
   val isTransmissive = Bool()
   val isNegative     = Bool() // the ray's direction, on its dominant axis
-  val isMasked       = Option.when(config.device.frame.rays)(Bool())
+  val isMasked       = QueryBits(config)(Bool())
 }
 
 /** Depths of the vertices along the ray's dominant axis. */
@@ -146,7 +146,7 @@ final class TriangleCandidate(config: PartConfig) extends Bundle {
   val ray     = new TriangleRay(config.numbers)
 
   /** The ray's mask leaves the record's triangles out. */
-  val isMasked = Option.when(config.device.frame.rays)(Bool())
+  val isMasked = QueryBits(config)(Bool())
 }
 
 /** Where a ray intersects a triangle. */

@@ -6,7 +6,7 @@ import colonnade.common.{Context, ContextTable, TimingSlice}
 import colonnade.config.TraversalConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
-import colonnade.ray.{EntryLimits, PreparedRay, RayFormats}
+import colonnade.ray.{EntryLimits, PreparedRay, QueryBits, RayFormats}
 import colonnade.shading.Occlusion
 import colonnade.traversal.{TMaxReader, TMaxUnits, TriangleHit, TriangleResult}
 
@@ -97,7 +97,7 @@ final class HitTable(config: TraversalConfig) extends Module {
 private final class HitDetails(config: TraversalConfig) extends Bundle {
   val weights  = Vec(3, new Fixed(new RayFormats(config.numbers).weight))
   val backSide = Bool()
-  val isClear  = Option.when(config.device.frame.rays)(Bool())
+  val isClear  = QueryBits(config)(Bool())
 }
 
 /** A read port of the [[HitTable]], seen from the reader. */
@@ -108,7 +108,7 @@ final class HitReader(config: TraversalConfig) extends Bundle {
   val hasHit    = Input(Bool())
   val occlusion = Input(Occlusion())
   val hit       = Input(new TriangleHit(config))
-  val isClear   = Option.when(config.device.frame.rays)(Input(Bool()))
+  val isClear   = QueryBits(config)(Input(Bool()))
 }
 
 final class HitLimitsIO(config: TraversalConfig) extends Bundle {

@@ -91,7 +91,7 @@ final class Intersector(config: TraversalConfig) extends Module {
   triangles.candidate :<>= io.triangles
   hitTable.io.result.valid := result.fire
   hitTable.io.result.bits  := result.bits
-  if (config.device.frame.rays) {
+  if (ray.limits.nonEmpty) {
     val limits = Module(new HitLimits(config)).io
     limits.rays                   := io.rays
     limits.result                 := result.bits

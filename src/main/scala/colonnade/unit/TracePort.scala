@@ -7,7 +7,7 @@ import colonnade.config.PathConfig
 import colonnade.environment.HitDistance
 import colonnade.formats.{InstanceNumber, RecordFormats}
 import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.{PreparedRay, RayFormats, RayRequest}
+import colonnade.ray.{PreparedRay, QueryBits, RayFormats, RayRequest}
 import colonnade.shading.{Occlusion, ShadeRequest}
 import colonnade.traversal.TriangleHit
 
@@ -43,7 +43,7 @@ final class TraceResult(config: PathConfig) extends Bundle {
   val hit       = new TriangleHit(config)
 
   /** The hit triangle is not opaque. */
-  val isClear = Option.when(config.device.frame.rays)(Bool())
+  val isClear = QueryBits(config)(Bool())
 
   val visit = Option.when(config.device.frame.hasInstances)(new VisitOutcome(config))
 }
