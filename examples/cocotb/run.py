@@ -49,7 +49,7 @@ def main(arguments: argparse.Namespace) -> None:
     cache, defines, parameters = memory["cache"], {}, {}
     if arguments.axi4:
         # A device for rays has an id for each column, and one for its batches
-        identifiers = int(config["array"]["columns"]).bit_length() if config["frame"].get("rays") else 1
+        identifiers = int(config["array"]["columns"]).bit_length() if config.get("queries") else 1
         bus_bytes = json.loads((design / "shell.json").read_text())["busBytes"]
         parameters = {"MASTER_BYTES": bus_bytes, "DEVICE_ID": identifiers}
     if arguments.axi4 and cache is not None:

@@ -89,7 +89,6 @@ def manifest_data(
                 "lights": 2,
                 "maxBounces": 4,
                 "emission": False,
-                "rays": False,
             },
         },
         "numbers": numbers,

@@ -58,7 +58,7 @@ class Colonnade(LiteXModule):  # type: ignore[misc]
         config = json.loads((folder / "manifest.json").read_text())["config"]
         records = config["columnBvhMemory"]
         # A device for rays has an identifier for each column, and one for its batches
-        identifiers = int(config["array"]["columns"]).bit_length() if config["frame"].get("rays") else 1
+        identifiers = int(config["array"]["columns"]).bit_length() if config.get("queries") else 1
         self.registers = axi.AXILiteInterface(data_width=32, address_width=32)
         self.memory = axi.AXIInterface(data_width=width, address_width=32, id_width=identifiers)
         self.ev = _Interrupt()

@@ -17,11 +17,11 @@ def check_size(size: Size, manifest: Manifest) -> None:
     """
     if min(size) < 1:
         raise UserError(f"a frame of {size[0]}x{size[1]} has no pixels")
-    limits = manifest.config["frame"]
-    if limits["rays"]:
+    if manifest.has_queries:
         raise UserError(
-            "this hardware traces rays of applications and has no frames (frame.rays): take another, such as edge"
+            "this hardware traces rays of applications and has no frames (queries): take another, such as edge"
         )
+    limits = manifest.config["frame"]
     for length, key in zip(size, ("maxWidth", "maxHeight"), strict=True):
         if length > limits[key]:
             raise UserError(

@@ -16,7 +16,7 @@ def idle_contexts(config: Mapping[str, Any]) -> int:
         config: `Manifest.config`.
     """
     array = config["array"]
-    return max(0, int(array["rows"]) * int(array["contexts"]) - int(config["units"]["pathContexts"]))
+    return max(0, int(array["rows"]) * int(array["contexts"]) - _rays(config)[0])
 
 
 def idle_notes(config: Mapping[str, Any]) -> list[str]:
@@ -26,14 +26,22 @@ def idle_notes(config: Mapping[str, Any]) -> list[str]:
         config: `Manifest.config`.
     """
     rows, contexts = int(config["array"]["rows"]), int(config["array"]["contexts"])
-    paths, marches = int(config["units"]["pathContexts"]), int(config["units"]["marches"])
+    (paths, setting), marches = _rays(config), int(config["units"]["marches"])
     fewer = f"set array.contexts={paths // rows}" if paths >= rows else "lower array.rows"
     kinds = [(idle_contexts(config), f"{rows * contexts:,} contexts (array.rows × array.contexts)", fewer)]
     if config["physicalAttributeMemory"] is not None:
         kinds.append((marches - paths, f"{marches} marches (units.marches)", f"set units.marches={paths}"))
     return [
-        f"{idle:,} of a column's {parts} are idle at any time, since its path unit has {paths} rays at most: raise"
-        f" units.pathContexts, or {advice}"
+        f"{idle:,} of a column's {parts} are idle at any time, since it has {paths} rays at most: raise"
+        f" {setting}, or {advice}"
         for idle, parts, advice in kinds
         if idle > 0
     ]
+
+
+def _rays(config: Mapping[str, Any]) -> tuple[int, str]:
+    """Rays in flight in a column, at most, and the setting of it."""
+    queries = config.get("queries")
+    if queries is not None:
+        return int(queries["contexts"]), "queries.contexts"
+    return int(config["units"]["pathContexts"]), "units.pathContexts"

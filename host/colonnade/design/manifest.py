@@ -173,6 +173,11 @@ class Manifest:
         return bool(self.config["frame"].get("gather", False))
 
     @property
+    def has_queries(self) -> bool:
+        """Whether the design answers rays of applications in place of frames (in older manifests `frame.rays`)."""
+        return self.config.get("queries") is not None or bool(self.config["frame"].get("rays", False))
+
+    @property
     def format_words(self) -> list[int]:
         """The format hash as eight words of 32 bits; the first has its first eight digits."""
         return [int(self.format_hash[start : start + 8], 16) for start in range(0, 64, 8)]

@@ -33,7 +33,7 @@ _MEANINGS = {
     "busResponse": "the memory has answered the device with an error",
     "misaligned": "the address of the framebuffer is not aligned: give a multiple of 4096",
     "noFrame": "no frame is set: set its registers before the start",
-    "noRays": "the design traces no rays of applications: choose one with frame.rays, such as traversal",
+    "noRays": "the design traces no rays of applications: choose one with queries, such as traversal",
     "noPhoto": "the device composites no photo, or not the strengths of its shadows: render without them",
 }
 

@@ -119,7 +119,7 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
 
 def harness_of(manifest: Manifest) -> tuple[str, ...]:
     """The sources of a design's harness, its program first."""
-    return ("rays.cpp" if manifest.config["frame"]["rays"] else "harness.cpp", *_HARNESS)
+    return ("rays.cpp" if manifest.has_queries else "harness.cpp", *_HARNESS)
 
 
 def _build(

@@ -40,7 +40,7 @@ class RayDevice(RayBackend):
     """A device of the Verilog, under Verilator.
 
     Args:
-        config: The design, with frame.rays.
+        config: The design, with `queries`.
         overrides: Settings of the design, "key=value".
         options: Options of the simulator, see `rays.cpp`.
         progress: Shows the building of the simulator.
@@ -48,7 +48,7 @@ class RayDevice(RayBackend):
         folder: The simulator's working directory.
 
     Raises:
-        UserError: The design has no frame.rays, or a program is missing.
+        UserError: The design has no `queries`, or a program is missing.
         RuntimeError: Of any call: the simulated hardware failed.
     """
 
@@ -110,10 +110,10 @@ def require_rays(manifest: Manifest) -> None:
     """Refuse a design that renders.
 
     Raises:
-        UserError: The design has no frame.rays.
+        UserError: The design has no `queries`.
     """
-    if not manifest.config["frame"]["rays"]:
-        raise UserError("the design traces no rays of applications: choose one with frame.rays, such as traversal")
+    if not manifest.has_queries:
+        raise UserError("the design traces no rays of applications: choose one with queries, such as traversal")
 
 
 def registers_text(registers: Mapping[str, Register]) -> str:

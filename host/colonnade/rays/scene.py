@@ -76,7 +76,7 @@ class Scene:
         overrides: Settings of the design, "key=value".
         refine: t and weights of a hit from the vertices as they are, in double. Where these say that the ray misses
             the face, a neighbour of it may take its place. False: what the device answers.
-        backend: "model": the bit-exact model; "rtl": the simulated device, with `frame.rays`; or a device of this
+        backend: "model": the bit-exact model; "rtl": the simulated device, with `queries`; or a device of this
             design, such as a `RayShell`.
 
     Raises:

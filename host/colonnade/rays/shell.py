@@ -27,7 +27,7 @@ class RayShell(Shell, RayBackend):
 
     Args:
         transport: The way to it; closed with the device, and if this fails.
-        design: Its design with the shell, and `frame.rays`.
+        design: Its design with the shell, and `queries`.
 
     Raises:
         UserError: There is no device, or one of another design; of any call: the memory is too small.

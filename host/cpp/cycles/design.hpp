@@ -50,7 +50,7 @@ struct Design {
                 throw std::invalid_argument(std::string(key) + " = " + std::to_string(lookUp(values, key)) +
                                             ": the cycle model takes at most " + std::to_string(most));
         };
-        limit("array.rows", 31), limit("array.columns", 32), limit("units.pathContexts", 256), limit("frame.rays", 0),
+        limit("array.rows", 31), limit("array.columns", 32), limit("units.pathContexts", 256),
             limit("frame.instances", 0), limit("units.extraSlices", 0);
         rows = take("array.rows"), columns = take("array.columns"), contexts = take("array.contexts"),
         pathContexts = take("units.pathContexts");

@@ -111,7 +111,7 @@ def test_no_part_of_a_preset_is_idle(preset: str) -> None:
         (
             "tiny",
             ("array.contexts=12",),
-            r"4 of a column's 12 contexts \(array.rows × array.contexts\) are idle at any time, since its path unit has"
+            r"4 of a column's 12 contexts \(array.rows × array.contexts\) are idle at any time, since it has"
             " 8 rays at most: raise units.pathContexts, or set array.contexts=8",
         ),
         ("tiny", ("array.rows=9",), "64 of a column's 72 contexts .* or lower array.rows"),

@@ -64,6 +64,13 @@ def test_a_manifest_is_read_from_its_file(tmp_path: Path, manifest: Manifest, ma
     assert Manifest.load(tmp_path) == manifest
 
 
+def test_a_design_of_any_version_tells_whether_it_has_queries(manifest_json: dict[str, Any]) -> None:
+    config = manifest_json["config"]
+    older = {"frame": config["frame"] | {"rays": True}}
+    for settings, expected in (({"queries": None}, False), ({"queries": {"contexts": 64}}, True), (older, True)):
+        assert Manifest.from_dict(manifest_json | {"config": config | settings}).has_queries is expected
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"version": 1}'])
 def test_an_invalid_manifest_is_one_line(tmp_path: Path, text: str) -> None:
     file = tmp_path / "manifest.json"

@@ -56,7 +56,7 @@ class Design:
     """Replaces generated Verilog."""
 
     text: str = "module Colonnade;"
-    manifest = SimpleNamespace(config={"frame": {"rays": False}})
+    manifest = SimpleNamespace(has_queries=False)
 
     def digest(self) -> str:
         return self.text

@@ -40,7 +40,7 @@ def output(design: GeneratedDesign, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 #: Of a device for rays with two columns, whose ids and arbiters stand for any number.
-COLUMNS = "tiny --set array.columns=2 --set frame.rays=true --set units.rayInterval=1 --set units.pathContexts=64"
+COLUMNS = "tiny --set array.columns=2 --set queries={} --set units.rayInterval=1"
 needs_icarus = pytest.mark.skipif(shutil.which("iverilog") is None, reason="no iverilog: apt-get install iverilog")
 
 

@@ -17,7 +17,7 @@ from colonnade.rays.device import RayBackend, RayDevice
 from colonnade.rays.scene import ALL_DEVICE_MASKS, FAN, OCCLUDED, RANGES
 
 #: The smallest design, and one of two columns and rows whose scene is in DRAM.
-RAYS = ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
+RAYS = ('queries={"contexts":256}', "units.rayInterval=1")
 SMALL = (
     *("array.rows=2", "array.columns=2", "units.triangleRows=2"),
     'columnBvhMemory.cache={"lines":16,"ways":4,"misses":4,"sharedLines":32,"sharedWays":4,"sharedMisses":8,"busBytes":16}',

@@ -18,7 +18,7 @@ from colonnade.rays.device import device_text, registers_text
 from colonnade.rays.scene import ALL_MASKS, design_text
 
 pytestmark = pytest.mark.matrix
-DESIGN = "tiny", ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
+DESIGN = "tiny", ('queries={"contexts":256}', "units.rayInterval=1")
 HIT = np.dtype([("t", "f8"), ("uv", "f8", 2), ("mesh", "u4"), ("face", "u4"), ("flags", "u4"), ("ray", "u4")])
 
 #: Two commits of a triangle, in a process that SIGPIPE would end; prints the statuses of its calls.

@@ -17,6 +17,7 @@ from colonnade.design.toolchain import project_root
 OTHERS = {"textureBytes", "cache", "lines", "sharedLines", "sharedWays", "physicalAttributeMemory", "encoding"} | {
     "mapBytes",
     "planeBytes",
+    "queries",
 }
 
 
@@ -40,7 +41,8 @@ def keys_of(config: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
 def test_every_key_is_in_the_table(rows: dict[str, list[str]]) -> None:
     config = dict(manifest_for("edge").manifest.config)
     config["precision"] = dict.fromkeys(("mac", "sqrt", "div"))
-    assert set(rows) == {*keys_of(config), "columnBvhMemory.cache", "physicalAttributeMemory"}
+    config["queries"] = manifest_for("traversal").manifest.config["queries"]
+    assert set(rows) == {*keys_of(config), "columnBvhMemory.cache", "physicalAttributeMemory", "queries"}
     assert all(meaning and default for meaning, _, default in rows.values())
     assert {key.split(".")[-1] for key, row in rows.items() if not row[1]} == OTHERS
 

@@ -149,12 +149,12 @@ def _workloads(
     from colonnade_lab.ppa.power.frame import FrameWorkload
 
     frame = FrameWorkload.of_benchmark(mesh, size, cycles or 16_000)
-    if not manifest.config["frame"]["rays"]:
+    if not manifest.has_queries:
         if rays is not None:
-            raise UserError("--rays is for a device with frame.rays: leave it out")
+            raise UserError("--rays is for a device with queries: leave it out")
         return (frame,)
     if size is not None:
-        raise UserError("--size is for a device that renders, and this one has frame.rays: give --rays")
+        raise UserError("--size is for a device that renders, and this one has queries: give --rays")
     return [BatchWorkload(frame.mesh, kind, rays or 2048, cycles or 200_000) for kind in KINDS]
 
 

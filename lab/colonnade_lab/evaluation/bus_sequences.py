@@ -109,7 +109,7 @@ def _write_job(folder: Path, design: GeneratedDesign) -> int:
     def address(name: str) -> int:
         return base + 4 * manifest.registers[name].address
 
-    write_work = _write_batches if manifest.config["frame"]["rays"] else _write_frame
+    write_work = _write_batches if manifest.has_queries else _write_frame
     image, values, lines = write_work(folder, manifest, address)
     (folder / "image").write_bytes(device_image(image, manifest))
     lines.append(f"image {_IMAGE} image")

@@ -132,5 +132,5 @@ def changed_units(reports: Sequence[Mapping[str, Any]]) -> list[tuple[str, float
 
 def require_frames(manifests: Sequence[Manifest]) -> None:
     """A `UserError` for a design that renders no frames."""
-    if any(manifest.config["frame"]["rays"] for manifest in manifests):
-        raise UserError("the cycle model renders frames, and this design has frame.rays")
+    if any(manifest.has_queries for manifest in manifests):
+        raise UserError("the cycle model renders frames, and this design has queries")

@@ -6,12 +6,14 @@ import json
 import re
 import subprocess
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from colonnade.common import processes
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
+from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import manifest_for
 from colonnade.design.toolchain import project_root
 
@@ -179,9 +181,9 @@ def config_problem(entry: Entry, content: Mapping[str, Any]) -> str | None:
     """Why a data file is not of today's configuration; None if it is."""
     try:
         config = manifest_for(entry.config, entry.overrides).manifest.config
+        measured = _today(content.get("config"))
     except UserError as error:
         return f"the generator refuses its configuration: {error}"
-    measured = _today(content.get("config"))
     if measured != config:
         keys = sorted(dict(_leaves(config)).items() ^ dict(_leaves(measured or {})).items())
         return f"it is of another configuration than {entry.config} ({', '.join(dict.fromkeys(k for k, _ in keys))})"
@@ -189,10 +191,21 @@ def config_problem(entry: Entry, content: Mapping[str, Any]) -> str | None:
 
 
 def _today(config: Any) -> Any:
-    """A configuration with all keys of today's."""
+    """A configuration with all keys of today's, as the generator migrates it."""
+    version = config.get("version") if isinstance(config, Mapping) else None
+    if version is not None and version < manifest_for("tiny").manifest.config["version"]:
+        return _migrated(json.dumps(config, sort_keys=True))
     for sections in _DEFAULTS:
         config = _completed(config, manifest_for("tiny", sections).manifest.config)
     return config
+
+
+@cache
+def _migrated(text: str) -> Mapping[str, Any]:
+    """The configuration of a JSON text of an older version."""
+    with temporary_folder() as folder:
+        (folder / "config.json").write_text(text, encoding="utf-8")
+        return manifest_for(str(folder / "config.json")).manifest.config
 
 
 def _completed(config: Any, defaults: Any) -> Any:

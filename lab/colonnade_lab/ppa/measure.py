@@ -64,7 +64,7 @@ def measure(
         found = measure_power(
             design, config, overrides, hierarchy, netlists, tech, workload, operation.megahertz, progress
         )
-        if design.manifest.config["frame"]["rays"]:
+        if design.manifest.has_queries:
             batches.append(found)
             continue
         power = found

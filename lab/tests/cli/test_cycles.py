@@ -67,7 +67,7 @@ def test_units_that_differ_are_named() -> None:
                 "--config",
                 "traversal",
             ),
-            "frame.rays",
+            "queries",
         ),
         (("--config", "edge", "--set", "array.columns=64"), "at most 32"),
         (("--config", "fpga"), "units.extraSlices"),

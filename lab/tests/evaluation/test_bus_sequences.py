@@ -13,7 +13,7 @@ CACHE = {"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2,
 CACHE |= {"busBytes": 32, "parity": True}
 PLAIN, CACHED = ("array.columns=2",), ("array.columns=2", f"columnBvhMemory.cache={json.dumps(CACHE)}")
 
-RAYS = ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=64")
+RAYS = ("queries={}", "units.rayInterval=1")
 IN_ROOM = ("array.columns=2", 'physicalAttributeMemory={"width":96,"height":72}', "frame.maxBounces=1")
 
 

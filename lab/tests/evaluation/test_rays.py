@@ -39,7 +39,7 @@ def test_calls_are_measured_beside_those_of_embree() -> None:
 
 #: Designs for rays beside the preset: one traversal unit, and two columns of two rows whose scene is in DRAM, of 16
 #: bits and of 24.
-_TINY = ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
+_TINY = ('queries={"contexts":256}', "units.rayInterval=1")
 _SMALL = ("array.rows=2", "array.columns=2", "units.triangleRows=2")
 _EXACT = ("geometry.vertexBits=24", "geometry.triangleBits=32")
 

@@ -104,6 +104,19 @@ def test_a_report_of_other_hardware_is_refused(docs: Path, monkeypatch: pytest.M
     assert content(docs)["result"] == {"equal": True}
 
 
+def test_configurations_of_older_versions_are_migrated(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure.measure(ENTRY, docs)
+    older, read = {"version": 3, "array": {"rows": 1}, "frame": {"rays": True}}, []
+
+    def generator(config: str, *_: object) -> SimpleNamespace:
+        read.extend([json.loads(Path(config).read_text())] if config.endswith(".json") else [])
+        return SimpleNamespace(manifest=SimpleNamespace(config={"version": 4, "array": {"rows": 1}}))
+
+    monkeypatch.setattr(data, "manifest_for", generator)
+    (docs / "data" / "bench-tiny.json").write_text(json.dumps(content(docs) | {"config": older}))
+    assert not list(data.problems(docs)) and read == [older]
+
+
 def test_figures_of_other_hardware_are_refused(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     measure.measure(ENTRY, docs)
     file = docs / "data" / "bench-tiny.json"

@@ -63,14 +63,14 @@ def fuzzed_design(
     """
     if refit:
         return shell_design_for(config, overrides, bus_bytes, progress, refit=True)
-    if manifest_for(config, overrides, progress).manifest.config["frame"]["rays"]:
+    if manifest_for(config, overrides, progress).manifest.has_queries:
         return shell_design_for(config, overrides, RAY_BUS, progress)
     return design_for(config, overrides, progress)
 
 
 def bench_of(design: GeneratedDesign, progress: Progress = QUIET) -> Bench[Any]:
     """What runs the cases of a design that `fuzzed_design` answers."""
-    if design.manifest.config["frame"]["rays"]:
+    if design.manifest.has_queries:
         return BatchBench(design, progress)
     return RefitBench(design, progress) if (design.dir / "shell.json").exists() else FrameBench(design, progress)
 

@@ -43,8 +43,8 @@ class BatchWorkload(Workload):
 
     def check(self, manifest: Manifest) -> None:
         """See `Workload`."""
-        if not manifest.config["frame"]["rays"]:
-            raise UserError("the design answers no batches of rays: choose one with frame.rays, such as traversal")
+        if not manifest.has_queries:
+            raise UserError("the design answers no batches of rays: choose one with queries, such as traversal")
 
     def run(self, column: OneColumn, recorded: GeneratedDesign, folder: Path, progress: Progress) -> Mapping[str, Any]:
         """See `Workload`."""

@@ -16,7 +16,7 @@ from colonnade_lab.evaluation.fuzz.campaign import fuzz, fuzzed_design
 from colonnade_lab.evaluation.fuzz.rays import BATCH, RayBatch, RayScene, any_batch
 
 #: The design of `test_bus_sequences.py`, whose simulator is an optimised one.
-DESIGN = "tiny", ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=64")
+DESIGN = "tiny", ("queries={}", "units.rayInterval=1")
 
 
 @pytest.fixture(autouse=True)
@@ -82,7 +82,7 @@ def test_wrong_batches_fail_by_the_rules_of_the_page(bench: BatchBench) -> None:
 
 @pytest.mark.verilator
 def test_device_and_model_agree_on_batches() -> None:
-    """Long version: ``colonnade fuzz --config tiny --set frame.rays=true … --cases 1000``."""
+    """Long version: ``colonnade fuzz --config tiny --set queries={} … --cases 1000``."""
     report = fuzz(fuzzed_design(*DESIGN), 36, seed=1)
     assert report["disagreements"] == [] and report["legal_failures"] == 0
     assert report["kinds"]["rays"] == {"same": 12, "changed": 0, "flagged": 0, "watchdog": 0, "disagree": 0}

@@ -107,7 +107,7 @@ RAY_PORTS = {
 @pytest.mark.matrix
 @pytest.mark.verilator
 def test_a_batch_is_recorded_from_its_first_run_to_the_end_of_the_last_one() -> None:
-    overrides = ("array.rows=2", "units.triangleRows=2", "units.pathContexts=64")
+    overrides = ("array.rows=2", "units.triangleRows=2", "queries.contexts=64")
     mesh = FrameWorkload.of_benchmark("torus", None, 0).mesh
     batch = BatchWorkload(mesh, KINDS[4], 192, 20_000)
     whole = record("traversal", overrides, RAY_PORTS, batch)

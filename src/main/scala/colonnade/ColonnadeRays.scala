@@ -36,7 +36,7 @@ final class ColonnadeRaysIO(config: ColonnadeConfig) extends Bundle {
   * batches into the ring, and moves `rays.tail`.
   */
 final class ColonnadeRays(config: ColonnadeConfig) extends Module {
-  require(config.frame.rays, "a device for rays needs frame.rays=true")
+  require(config.queries.nonEmpty, "a device for rays needs queries")
   val io = IO(new ColonnadeRaysIO(config))
 
   private val registers = Module(RegisterFile.ofRays(config)).io

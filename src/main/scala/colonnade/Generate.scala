@@ -58,7 +58,7 @@ object Generate {
     }
 
   private def top(config: ColonnadeConfig, axi: Option[ShellConfig]): RawModule =
-    if (config.frame.rays) axi.fold[RawModule](new ColonnadeRays(config))(new ColonnadeRaysAxi(config, _))
+    if (config.queries.nonEmpty) axi.fold[RawModule](new ColonnadeRays(config))(new ColonnadeRaysAxi(config, _))
     else axi.fold[RawModule](new Colonnade(config))(new ColonnadeAxi(config, _))
 
   private def generate(options: Options): Unit = {
@@ -75,7 +75,7 @@ object Generate {
       OutputFiles.replaceDirectory(path(directory)) { fresh =>
         if (!options.manifestOnly) {
           Emit(top(config, axi), fresh, options.blackBoxMemories)
-          val name = if (axi.nonEmpty) "ColonnadeAxi" else if (config.frame.rays) "ColonnadeRays" else "Colonnade"
+          val name = if (axi.nonEmpty) "ColonnadeAxi" else if (config.queries.nonEmpty) "ColonnadeRays" else "Colonnade"
           CoreFile.write(name, fresh)
         }
         OutputFiles.writeFile(fresh.resolve("manifest.json"), formats.Json.pretty(Manifest(config)))
@@ -86,10 +86,10 @@ object Generate {
 
   /** The shell of `--axi`, with what the other options add to it. */
   private def shell(options: Options, config: ColonnadeConfig): Option[ShellConfig] = {
-    import config.frame.rays
+    val rays = config.queries.nonEmpty
     for ((name, isGiven) <- Seq("--pixel-stream" -> options.pixelStream, "--refit" -> options.refit) if isGiven) {
       Require(name, options.axi.nonEmpty, "needs --axi BYTES")
-      Require(name, !rays, "is for frames: it does not go with frame.rays")
+      Require(name, !rays, "is for frames: it does not go with queries")
     }
     if (options.refit && !rays) {
       Require("--refit", config.columnBvhMemory.cache.nonEmpty, "needs columnBvhMemory.cache={}")
@@ -97,7 +97,7 @@ object Generate {
     }
     val ownBytes = if (rays) RayBatch.bytes else 16
     options.axi.map(_.getOrElse(ownBytes)).map { bytes =>
-      Require("frame.rays", !rays || bytes == RayBatch.bytes, s"needs --axi ${RayBatch.bytes}")
+      Require("queries", !rays || bytes == RayBatch.bytes, s"needs --axi ${RayBatch.bytes}")
       ShellConfig(bytes, pixelStream = options.pixelStream, refit = options.refit)
     }
   }

@@ -77,14 +77,14 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     val needed = Seq("--set", "columnBvhMemory.cache={}", "--set", "geometry.vertexBits=19")
     run(shell("tiny", "--axi" +: "16" +: "--refit" +: needed: _*): _*)._1 shouldBe 0
     for (option <- Seq("--refit", "--pixel-stream"))
-      needs(shell("traversal", "--axi", "64", option), s"$option is for frames: it does not go with frame.rays")
+      needs(shell("traversal", "--axi", "64", option), s"$option is for frames: it does not go with queries")
   }
 
   it should "give a device for rays the bus of a batch" in Scratch { scratch =>
     val output = scratch.resolve("out")
-    refused("--config", "traversal", "--axi", "16", "--output", output.toString)("frame.rays needs --axi 64")
-    refused("--config", "tiny", "--set", "frame.rays=true", "--axi=16", "--output", output.toString)(
-      "frame.rays needs units.rayInterval=1, units.pathContexts=64, --axi 64"
+    refused("--config", "traversal", "--axi", "16", "--output", output.toString)("queries needs --axi 64")
+    refused("--config", "tiny", "--set", "queries={}", "--axi=16", "--output", output.toString)(
+      "queries needs units.rayInterval=1, --axi 64"
     )
     for ((preset, bytes) <- Seq("tiny" -> 16, "traversal" -> 64)) {
       run("--config", preset, "--axi", "auto", "--output", output.toString, "--manifest-only") shouldBe ((0, ""))

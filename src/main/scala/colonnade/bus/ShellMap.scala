@@ -104,12 +104,16 @@ object ShellMap {
   def of(config: ColonnadeConfig, shell: ShellConfig): Seq[ShellRegister] = {
     val ofFrames = Seq("framebuffer", "photo", "stream")
     val absent   =
-      (if (config.frame.rays) ofFrames else Seq("rays")) ++ Option.unless(shell.refit)("refit")
+      (if (config.queries.nonEmpty) ofFrames else Seq("rays")) ++ Option.unless(shell.refit)("refit")
     registers.filterNot(register => absent.contains(register.name.takeWhile(_ != '.'))).map {
       case register if register.name.startsWith("interrupt.") => register.copy(width = Interrupts.of(shell).size)
       case register                                           => register
     }
   }
+
+  /** Whether a design has the registers of a part, by what precedes their dot. */
+  def has(part: String, config: ColonnadeConfig, shell: ShellConfig): Boolean =
+    of(config, shell).exists(_.name.startsWith(s"$part."))
 
   /** Names of a register's parts, the lowest first. */
   def bitsOf(register: String): Seq[String] = registers.filter(_.name == register).flatMap(_.fields).map(_.name)
@@ -143,7 +147,7 @@ object ShellMap {
       config.geometry.texture.nonEmpty,
       shell.pixelStream,
       shell.refit,
-      config.frame.rays
+      config.queries.nonEmpty
     )
     require(flags.size == features.size)
     val mask = flags.zipWithIndex.collect { case (true, bit) => 1 << bit }.sum
@@ -152,7 +156,7 @@ object ShellMap {
 
   /** 0 of a device for rays. */
   def frameSize(config: ColonnadeConfig): BigInt =
-    if (config.frame.rays) 0 else BigInt(config.frame.maxWidth) | BigInt(config.frame.maxHeight) << 16
+    if (config.queries.nonEmpty) 0 else BigInt(config.frame.maxWidth) | BigInt(config.frame.maxHeight) << 16
 
   /** The manifest's format hash as eight words; the first has its first eight digits. */
   def formatHash(config: ColonnadeConfig): Seq[BigInt] =
@@ -183,16 +187,16 @@ object ShellMap {
     )
   )
 
-  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word, and 256. With
-    * `frame.rays` they do not wait.
+  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word, and 256.
+    * Those of a device for rays do not wait.
     */
   def postedWrites(config: ColonnadeConfig): Int =
-    if (config.frame.rays) 2 else (1 << log2Ceil(writableWords(config).size)).max(256)
+    if (config.queries.nonEmpty) 2 else (1 << log2Ceil(writableWords(config).size)).max(256)
 
   /** Words of the device's registers that may be written, without `control.start` where the shell starts frames. */
   def writableWords(config: ColonnadeConfig): Seq[Int] =
     RegisterMap(config)
       .filter(_.access != Access.ReadOnly)
-      .filter(register => config.frame.rays || register.name != "control.start")
+      .filter(register => config.queries.nonEmpty || register.name != "control.start")
       .flatMap(register => register.address until register.address + register.words)
 }

@@ -41,6 +41,8 @@ final class RefitControl(config: ColonnadeConfig) extends Bundle {
 }
 
 final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
+  private val hasFrames = ShellMap.has("framebuffer", config, shell)
+
   val access = Flipped(new RegisterAccess(ShellMap.addressBits))
 
   /** To the device's registers. The port is lent to the shell's control in some cycles. */
@@ -48,19 +50,19 @@ final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extend
   val deviceIsFree = Input(Bool())
 
   /** Of a device for frames. */
-  val framebuffer = Option.unless(config.frame.rays)(Output(new FramebufferSettings))
+  val framebuffer = Option.when(hasFrames)(Output(new FramebufferSettings))
   val image       = Output(new ImageSettings)
   val refit       = Option.when(shell.refit)(new RefitControl(config))
 
   /** Of a device for rays: where its batches lie. */
-  val window   = Option.when(config.frame.rays)(Output(new AddressWindow))
+  val window   = Option.when(ShellMap.has("rays", config, shell))(Output(new AddressWindow))
   val commands = Output(new ShellCommands)
 
   /** All writes to the device's registers have arrived there. */
   val writesAreDone = Output(Bool())
 
   val status            = Input(new ShellStatus)
-  val framebufferErrors = Option.unless(config.frame.rays)(Input(new FramebufferError))
+  val framebufferErrors = Option.when(hasFrames)(Input(new FramebufferError))
   val imageErrors       = Input(new ImageError)
 
   /** Pulses, see [[Interrupts]]; of refits they are made here. */
@@ -86,7 +88,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   require(ShellMap.deviceBase + 4 * deviceWords <= (1 << ShellMap.addressBits), "the device's registers fit")
 
   // Writes to the device wait while a frame runs; of a device for rays, they arrive before the next request
-  private val isForRays           = config.frame.rays.B
+  private val isForRays           = io.window.nonEmpty.B
   private val (posted, delivered) = withReset(reset.asBool || io.status.isResetting) {
     val queue = Module(new Queue(new PostedWrite(config), ShellMap.postedWrites(config), useSyncReadMem = true))
     (queue, TimingSlice.queue(queue.io.deq)) // of the memory's output
@@ -192,7 +194,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
 
   // Registers of the device
   private val tail      = RegisterMap(config).find(_.name == "rays.tail").fold(false.B)(deviceWord === _.address.U)
-  private val mayChange = if (config.frame.rays) isIdle || (tail && io.status.isRunning && canChange) else canChange
+  private val mayChange = if (io.window.nonEmpty) isIdle || (tail && io.status.isRunning && canChange) else canChange
   private val deviceWritable =
     VecInit(ShellMap.writableWords(config).map(_.U === deviceWord)).asUInt.orR && mayChange && posted.io.enq.ready
   private val inDevice = isDevice && request.address < (ShellMap.deviceBase / 4 + deviceWords).U

@@ -1,13 +1,11 @@
 package colonnade.config
 
-import chisel3.util.log2Ceil
-
 /** Shape of the array.
   *
   * @param rows     traversal units of a column (N)
   * @param columns  columns (M)
-  * @param contexts rays in flight in a traversal unit; contexts beyond `units.pathContexts` (over all rows) stay idle,
-  *                 with a note
+  * @param contexts rays in flight in a traversal unit; contexts beyond those of `units` or `queries` (over all rows)
+  *                 stay idle, with a note
   */
 final case class ArrayConfig(rows: Int = 1, columns: Int = 1, contexts: Int = 8) {
   Require.within("array.rows", rows, 1, ArrayConfig.maxRows)
@@ -80,8 +78,7 @@ final case class GeometryConfig(
   * @param triangleRows  rows of a group; more than the column has: all
   * @param marches       environment marches of a column (docs/march.md); beyond `pathContexts` they stay idle, with a
   *                      note
-  * @param pathContexts  pixels in flight in a column's path unit, at most 256; with `frame.rays` rays in flight, a
-  *                      power of two from 64 on
+  * @param pathContexts  pixels in flight in a column's path unit
   * @param rayInterval   most cycles a ray in ray set-up, while results are taken: 1 a pipeline, 32 sequential
   * @param shadeInterval most cycles of the shader for a light on a diffuse hit, while results are taken and texels come
   *                      at once: 3 a pipeline, 128 sequential
@@ -101,7 +98,7 @@ final case class UnitsConfig(
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
   Require.within("units.triangleRows", triangleRows, 1, UnitsConfig.maxTriangleRows)
   Require.within("units.marches", marches, 1, UnitsConfig.maxMarches)
-  Require.within("units.pathContexts", pathContexts, 1, UnitsConfig.maxRayContexts)
+  Require.within("units.pathContexts", pathContexts, 1, UnitsConfig.maxPathContexts)
   Require.oneOf("units.rayInterval", rayInterval, UnitsConfig.rayIntervals)
   Require.oneOf("units.shadeInterval", shadeInterval, UnitsConfig.shadeIntervals)
 }
@@ -109,7 +106,6 @@ final case class UnitsConfig(
 object UnitsConfig {
   val maxMarches:      Int = 16
   val maxPathContexts: Int = 256
-  val maxRayContexts:  Int = 1024
   val maxTriangleRows: Int = 16
 
   /** Intervals of sequential ray set-up and of the sequential shader, which hold at all formats. */
@@ -162,9 +158,6 @@ final case class ColumnBvhMemoryConfig(
   * @param emission   diffuse materials have an emission: docs/shading.md#colour-unit
   * @param gather     diffuse surfaces gather light (docs/gather.md); needs `maxBounces` above 0 and
   *                   `units.shadeInterval` 3
-  * @param rays       rays of applications in place of pixels (docs/rays.md#the-device); needs `maxBounces` 0,
-  *                   `units.rayInterval` 1, triangle tests of at most 38 bits, directions of at most 64 bits; excludes
-  *                   the environment and instances
   * @param instances  objects with transforms of their own (docs/path-tracer.md#instances): 0, or at least 2; needs
   *                   `geometry.bvh`
   */
@@ -178,7 +171,6 @@ final case class FrameConfig(
     hits:       Boolean = true,
     emission:   Boolean = false,
     gather:     Boolean = false,
-    rays:       Boolean = false,
     instances:  Int = 0
 ) {
   Require.within("frame.maxWidth", maxWidth, 8, 4096)
@@ -201,10 +193,21 @@ object FrameConfig {
   val maxInstances: Int = 16
 }
 
+/** Rays of applications.
+  *
+  * @param contexts rays in flight in a column
+  */
+final case class QueriesConfig(contexts: Int = 64) {
+  Require.oneOf("queries.contexts", contexts, Seq(64, 128, 256, 512, 1024))
+}
+
 /** A whole generator configuration: immutable, checked at construction. The names, types and defaults of the parameters
   * are the keys' of its JSON, see [[ConfigIO]]. The defaults are the preset `tiny`.
   *
   * @param physicalAttributeMemory the maps of an environment; null: no environment
+  * @param queries                 rays of applications in place of pixels (docs/rays.md#the-device); null: pixels;
+  *                                needs `frame.maxBounces` 0, `units.rayInterval` 1, triangle tests of at most 38 bits,
+  *                                directions of at most 64 bits; excludes the environment and instances
   */
 final case class ColonnadeConfig(
     array:                   ArrayConfig = ArrayConfig(),
@@ -213,12 +216,13 @@ final case class ColonnadeConfig(
     units:                   UnitsConfig = UnitsConfig(),
     columnBvhMemory:         ColumnBvhMemoryConfig = ColumnBvhMemoryConfig(),
     physicalAttributeMemory: Option[PhysicalAttributeMemoryConfig] = None,
-    frame:                   FrameConfig = FrameConfig()
+    frame:                   FrameConfig = FrameConfig(),
+    queries:                 Option[QueriesConfig] = None
 ) {
-  val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
+  val numbers: NumberFormats = NumberFormats(geometry, precision, frame, queries)
 
   Require("frame.instances", !frame.hasInstances || geometry.bvh, "needs geometry.bvh=true")
-  if (frame.rays) requireForRays()
+  if (queries.nonEmpty) requireForQueries()
   else {
     val hasPipeline = units.shadeInterval < UnitsConfig.sequentialShadeInterval
     Require("frame.gather", !frame.gather || frame.hasBounces, "needs frame.maxBounces=1")
@@ -227,27 +231,20 @@ final case class ColonnadeConfig(
       !frame.gather || hasPipeline,
       s"needs units.shadeInterval=${UnitsConfig.shadeIntervals.min}"
     )
-    Require(
-      "units.pathContexts",
-      units.pathContexts <= UnitsConfig.maxPathContexts,
-      s"must be at most ${UnitsConfig.maxPathContexts} without frame.rays"
-    )
   }
 
   /** Each rule is a setting with which it holds. */
-  private def requireForRays(): Unit = {
-    val contexts = (1 << log2Ceil(units.pathContexts)).max(64)
-    val macBits  = 64 - 2 - numbers.coordinateBits
+  private def requireForQueries(): Unit = {
+    val macBits = 64 - 2 - numbers.coordinateBits
     Seq(
       (!frame.hasInstances, "frame.instances=0"),
       (!frame.hasBounces, "frame.maxBounces=0"),
       (!frame.gather, "frame.gather=false"),
       (physicalAttributeMemory.isEmpty, "physicalAttributeMemory=null"),
       (units.rayInterval == 1, "units.rayInterval=1"),
-      (units.pathContexts == contexts, s"units.pathContexts=$contexts"),
       (numbers.gridBits <= 38, "geometry.triangleBits=38"),
       (precision.mac <= macBits, s"precision.mac=$macBits")
-    ).foreach { case (holds, setting) => Require("frame.rays", holds, s"needs $setting") }
+    ).foreach { case (holds, setting) => Require("queries", holds, s"needs $setting") }
   }
 
   /** Rows share triangle units. */
@@ -271,7 +268,7 @@ final case class ColonnadeConfig(
 
 object ColonnadeConfig {
 
-  /** The defaults, with every optional part. */
+  /** The defaults, with every optional part of a device for frames. */
   val complete: ColonnadeConfig = ColonnadeConfig(
     columnBvhMemory = ColumnBvhMemoryConfig(cache = Some(SceneCacheConfig())),
     physicalAttributeMemory = Some(PhysicalAttributeMemoryConfig()),

@@ -35,7 +35,11 @@ object ConfigIO {
     ujson.Obj.from(("version" -> ujson.Num(ConfigMigration.version)) +: ConfigSchema.written(config).obj.toSeq)
 
   private def completed(json: ujson.Value): ujson.Value =
-    ConfigSchema.completed(json, ColonnadeConfig.complete, ColonnadeConfig())
+    ConfigSchema.completed(json, example, ColonnadeConfig())
+
+  /** With every optional part, although no device has all of them. */
+  private lazy val example =
+    Require.unchecked(ColonnadeConfig.complete.copy(queries = Some(QueriesConfig())))
 
   private def built(json: ujson.Value): ColonnadeConfig = Require.all(ConfigPickler.read[ColonnadeConfig](json))
 
@@ -108,6 +112,7 @@ private[config] object ConfigPickler extends upickle.AttributeTagged {
   implicit private val encoding:  Reader[MapEncoding]                   = StringReader.map(MapEncoding.named(_).get)
   implicit private val maps:      Reader[PhysicalAttributeMemoryConfig] = macroR
   implicit private val frame:     Reader[FrameConfig]                   = macroR
+  implicit private val queries:   Reader[QueriesConfig]                 = macroR
   implicit val config:            Reader[ColonnadeConfig]               = macroR
 }
 

@@ -29,7 +29,8 @@ private[config] object ConfigMigration {
       },
       replaced("geometry", "arity")(_ => Nil),
       replaced("geometry", "trianglesPerRecord")(_ => Nil)
-    )
+    ),
+    Seq(raysAreQueries)
   )
 
   /** The present version; a file without one has version 1. */
@@ -54,12 +55,27 @@ private[config] object ConfigMigration {
   /** Replaces a key of a section, if it has one, by others. */
   private def replaced(section: String, key: String)(by: ujson.Value => Seq[(String, ujson.Value)]): Change = config =>
     for {
-      fields <- config.value.get(section).flatMap(_.objOpt)
+      fields <- sectionOf(config, section)
       value  <- fields.remove(key)
     } fields ++= by(value)
 
   private def renamed(section: String, key: String, name: String): Change =
     replaced(section, key)(value => Seq(name -> value))
+
+  /** `frame.rays` has a section of its own, and contexts of its own. */
+  private def raysAreQueries: Change = config =>
+    for {
+      frame <- sectionOf(config, "frame")
+      isSet <- frame.get("rays").flatMap(_.boolOpt)
+    } {
+      frame.remove("rays")
+      if (isSet) {
+        val contexts = sectionOf(config, "units").flatMap(_.remove("pathContexts"))
+        config("queries") = ujson.Obj.from(contexts.map("contexts" -> _))
+      }
+    }
+
+  private def sectionOf(config: ujson.Obj, name: String) = config.value.get(name).flatMap(_.objOpt)
 
   private def zeroIsDefault(section: String, key: String): Change =
     replaced(section, key)(value => Seq(key -> value).filterNot(_._2 == ujson.Num(0)))

@@ -4,7 +4,12 @@ package colonnade.config
   *
   * The manifest contains [[entries]]; model, packer and harness read them and derive nothing themselves.
   */
-final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionConfig, frame: FrameConfig) {
+final case class NumberFormats(
+    geometry:  GeometryConfig,
+    precision: PrecisionConfig,
+    frame:     FrameConfig,
+    queries:   Option[QueriesConfig]
+) {
   import NumberFormats._
 
   val vertexBits: Int = geometry.vertexBits
@@ -33,7 +38,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
 
   val weightBits:      Int = mantissaBits.min(gridBits - 1)
   val distanceDigits:  Int = gridBits.min(mantissaBits)
-  val barycentricBits: Int = if (frame.rays) weightBits else weightBits.min(colourBits)
+  val barycentricBits: Int = if (queries.nonEmpty) weightBits else weightBits.min(colourBits)
 
   /** Magnitude bits of a vector component in the shader's dot products: 18 suffice for a cosine of `colourBits`. */
   val shadeBits:      Int = macBits.min(colourBits + 6)

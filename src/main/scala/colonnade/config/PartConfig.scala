@@ -15,9 +15,9 @@ sealed abstract class PartConfig {
   final def isLarge: Boolean = contexts > ArrayConfig.maxContexts
 }
 
-/** The path unit of a column, and the units that serve it: one context per pixel in flight. */
+/** The source of a column's rays, and the units that serve it: one context per pixel, or per ray of an application. */
 final case class PathConfig(device: ColonnadeConfig) extends PartConfig {
-  val contexts: Int = device.units.pathContexts
+  val contexts: Int = device.queries.fold(device.units.pathContexts)(_.contexts)
 }
 
 /** A traversal unit: one context per ray in flight. */

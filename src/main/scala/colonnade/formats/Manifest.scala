@@ -25,8 +25,8 @@ object Manifest {
       "fields"   -> ujson.Arr.from(RegisterMap(config).map(register))
     )
     val outputs =
-      if (config.frame.rays) Seq("batch" -> new RayBatch, "ray" -> new RayRecord, "hit" -> new HitRecord)
-      else Seq("pixel"                   -> new Pixel(config))
+      if (config.queries.nonEmpty) Seq("batch" -> new RayBatch, "ray" -> new RayRecord, "hit" -> new HitRecord)
+      else Seq("pixel"                         -> new Pixel(config))
     val streams = ujson.Obj.from(
       (outputs :+ "load" -> new Load(config)).map { case (name, kind) => name -> fields(Layout.of(kind)) }
     )

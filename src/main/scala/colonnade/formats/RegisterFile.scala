@@ -30,7 +30,7 @@ final class RegisterFileIO[S <: Bundle with SceneRegisters, D <: Bundle with Bus
   val invalidate = if (config.columnBvhMemory.cache.nonEmpty) Some(Output(Bool())) else None
 
   /** Of a device for rays. */
-  val commands = Option.when(config.frame.rays)(Output(new RayCommands))
+  val commands = RegisterMap.commands(config).map(Output(_))
 }
 
 /** The registers of the host, at the addresses of [[RegisterMap]]. Settings above their limit are clamped for the

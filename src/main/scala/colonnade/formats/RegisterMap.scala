@@ -58,13 +58,13 @@ object RegisterMap {
     Block(
       16,
       Access.ReadOnly,
-      config => named("errors", if (config.frame.rays) new RayErrors(config) else new Errors(config))
+      config => named("errors", if (config.queries.nonEmpty) new RayErrors(config) else new Errors(config))
     ),
     Block(28, Access.ReadOnly, ofRays(config => named("errors", new RayErrors(config)).takeRight(1)), isCommon = false),
     Block(
       32,
       Access.ReadOnly,
-      config => named("counters", if (config.frame.rays) new RayCounters(config) else new Counters(config))
+      config => named("counters", if (config.queries.nonEmpty) new RayCounters(config) else new Counters(config))
     ),
     Block(
       192,
@@ -77,10 +77,13 @@ object RegisterMap {
 
   /** Registers that the host writes before a frame, or a batch. */
   def settings(config: ColonnadeConfig): Data =
-    if (config.frame.rays) new RayRegisters(config) else new FrameRegisters(config)
+    if (config.queries.nonEmpty) new RayRegisters(config) else new FrameRegisters(config)
+
+  /** Registers that the host writes while batches run. */
+  def commands(config: ColonnadeConfig): Option[RayCommands] = config.queries.map(_ => new RayCommands)
 
   private def ofRays(numbers: ColonnadeConfig => Seq[Field])(config: ColonnadeConfig): Seq[Field] =
-    if (config.frame.rays) numbers(config) else Nil
+    if (config.queries.nonEmpty) numbers(config) else Nil
 
   def apply(config: ColonnadeConfig): Seq[Register] = {
     val limits = RegisterLimits(config)

@@ -37,7 +37,7 @@ final class RayFormats(numbers: NumberFormats) {
   * what there is, as the user bits of a bus. None in a design without such rays.
   */
 object QueryBits {
-  def apply[T <: Data](config: PartConfig)(bits: => T): Option[T] = Option.when(config.device.frame.rays)(bits)
+  def apply[T <: Data](config: PartConfig)(bits: => T): Option[T] = config.device.queries.map(_ => bits)
 }
 
 /** A ray to prepare. `dir` is its direction, of any length. A shadow ray ends at origin + dir, the light. */

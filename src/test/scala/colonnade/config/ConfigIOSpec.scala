@@ -171,6 +171,18 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
         "geometry" -> ujson.Obj("boxBits" -> bits, "arity" -> 2, "trianglesPerRecord" -> 1)
       ).geometry shouldBe
         GeometryConfig(boxBits = present)
+    val rays = migrated(
+      "version" -> 3,
+      "units"   -> ujson.Obj("pathContexts" -> 128, "rayInterval" -> 1),
+      "frame"   -> ujson.Obj("rays" -> true, "lights" -> 2)
+    )
+    rays shouldBe ColonnadeConfig(
+      units = UnitsConfig(rayInterval = 1),
+      frame = FrameConfig(lights = 2),
+      queries = Some(QueriesConfig(128))
+    )
+    migrated("frame" -> ujson.Obj("rays" -> false), "units" -> ujson.Obj("pathContexts" -> 9)) shouldBe
+      ColonnadeConfig(units = UnitsConfig(pathContexts = 9))
   }
 
   it should "refuse newer versions, and keys of older versions in newer ones" in {
@@ -204,22 +216,24 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
   it should "refuse all that is illegal at once, and nothing that only follows" in {
     refusal("tiny", "array.rows=0", "frame.lights=9") shouldBe
       "array.rows is 0; it must be from 1 to 256. frame.lights is 9; it must be from 1 to 8"
-    refusal("edge", "precision.div=8", "columnBvhMemory.banks=3", "frame.rays=true") should startWith(
-      "precision.div is 8; it must be from 16 to 64. columnBvhMemory.banks is 3; it must be one of 1, 2, 4. frame.rays"
+    refusal("edge", "precision.div=8", "columnBvhMemory.banks=3", "queries={}") should startWith(
+      "precision.div is 8; it must be from 16 to 64. columnBvhMemory.banks is 3; it must be one of 1, 2, 4. queries"
     )
     refusal("edge", "physicalAttributeMemory.tileSize=0", "units.marches=17") shouldBe
       "units.marches is 17; it must be from 1 to 16. physicalAttributeMemory.tileSize is 0; it must be one of 16, 32"
   }
 
   it should "name settings that make a feature legal, all of them at once" in {
-    refusal("tiny", "frame.rays=true") shouldBe "frame.rays needs units.rayInterval=1, units.pathContexts=64"
-    refusal("edge", "frame.rays=true") shouldBe "frame.rays needs frame.maxBounces=0, frame.gather=false, " +
-      "physicalAttributeMemory=null, units.pathContexts=256"
+    refusal("tiny", "queries={}") shouldBe "queries needs units.rayInterval=1"
+    refusal("edge", "queries={}") shouldBe
+      "queries needs frame.maxBounces=0, frame.gather=false, physicalAttributeMemory=null"
     refusal("tiny", "frame.gather=true") shouldBe "frame.gather needs frame.maxBounces=1, units.shadeInterval=3"
     val designs = ConfigIO.presets.map(_ -> "frame.instances=0") ++
       Seq("64b64s64d" -> "frame.maxWidth=4096", "small" -> "frame.instances=4", "edge" -> "units.pathContexts=1")
-    for ((name, other) <- designs; feature <- Seq("frame.rays", "frame.gather") if name != "traversal") {
-      val settings = Seq(other, s"$feature=true")
+    for (
+      (name, other) <- designs; (feature, on) <- Seq("queries" -> "{}", "frame.gather" -> "true") if name != "traversal"
+    ) {
+      val settings = Seq(other, s"$feature=$on")
       val needed   =
         try { ConfigIO.load(name, settings); Nil }
         catch { case error: ConfigError => error.getMessage.stripPrefix(s"$feature needs ").split(", ").toSeq }

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.Queue
 import colonnade.{Model, Packed, TestConfigs}
 import colonnade.axi.{AxiPins, AxiReadPort, AxiWritePort}
-import colonnade.config.{ArrayConfig, ColonnadeConfig, UnitsConfig}
+import colonnade.config.{ArrayConfig, ColonnadeConfig, QueriesConfig, UnitsConfig}
 import colonnade.formats.{NodeRecord, RayBatch, RayPlacement, RayRegisters, RecordFormats}
 
 /** Designs for rays of applications. */
@@ -15,8 +15,9 @@ object RayConfigs {
     val base = TestConfigs.tiny
     base.copy(
       geometry = base.geometry.copy(triangleBits = Some(24)),
-      units = base.units.copy(rayInterval = UnitsConfig.rayIntervals.min, pathContexts = 256),
-      frame = base.frame.copy(maxBounces = 0, rays = true)
+      units = base.units.copy(rayInterval = UnitsConfig.rayIntervals.min),
+      frame = base.frame.copy(maxBounces = 0),
+      queries = Some(QueriesConfig(256))
     )
   }
 
@@ -26,7 +27,7 @@ object RayConfigs {
   /** Small, with a short stack. */
   private def small(array: ArrayConfig): ColonnadeConfig = tiny.copy(
     array = array,
-    units = tiny.units.copy(pathContexts = 64),
+    queries = Some(QueriesConfig(64)),
     columnBvhMemory = tiny.columnBvhMemory.copy(stackDepth = 8)
   )
   def ofRows(rows:       Int): ColonnadeConfig = small(ArrayConfig(rows, columns = 1, contexts = 4))

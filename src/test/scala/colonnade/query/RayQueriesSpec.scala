@@ -6,7 +6,7 @@ import chiseltest._
 import colonnade.TestParts._
 import colonnade.axi.AxiMemory
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, PathConfig}
+import colonnade.config.{ColonnadeConfig, PathConfig, QueriesConfig}
 import colonnade.formats.{Bounds, HitRecord}
 import colonnade.numbers.FixedPorts._
 import colonnade.shading.Occlusion
@@ -62,7 +62,7 @@ class RayQueriesSpec extends AnyFlatSpec with OneSimulation with Matchers {
   behavior of "RayQueries"
 
   private val contexts = 64
-  private val config   = RayConfigs.tiny.copy(units = RayConfigs.tiny.units.copy(pathContexts = contexts))
+  private val config   = RayConfigs.tiny.copy(queries = Some(QueriesConfig(contexts)))
 
   inOneSimulation(new RayQueriesHarness(config))(
     "give hits of rays"                   -> trace(response = 0, form = 0),

@@ -2,7 +2,7 @@ package colonnade.query
 
 import chiseltest._
 import colonnade.Simulation
-import colonnade.config.PathConfig
+import colonnade.config.{PathConfig, QueriesConfig}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -17,7 +17,7 @@ class RayRingSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
 
   for (contexts <- Seq(64, 128))
     it should s"offer rays in their order, with $contexts contexts" in
-      test(new RayRing(PathConfig(tiny.copy(units = tiny.units.copy(pathContexts = contexts)))))
+      test(new RayRing(PathConfig(tiny.copy(queries = Some(QueriesConfig(contexts))))))
         .withAnnotations(Simulation.verilator) { dut =>
           val patient = new RingBench(dut, contexts, new Random(1), readiness = 0.5)
           patient.run(60)
