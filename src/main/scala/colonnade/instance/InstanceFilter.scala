@@ -27,14 +27,15 @@ final class InstanceFilterIO(config: PathConfig) extends Bundle {
   val entered = Decoupled(new EnteredBoxes(config))
 }
 
-/** Finds the instances whose boxes a ray may enter, four a cycle, with positions in cells and slopes of 6 bits: never
-  * fewer than in exact arithmetic. Latency: four cycles for up to four instances. Source: docs/numbers.md, section 10.
+/** Finds the instances whose boxes a ray may enter, eight a cycle, with positions in cells and slopes of 6 bits: never
+  * fewer than in exact arithmetic. Latency: four cycles for up to eight instances. Source: docs/numbers.md, section 10.
   */
 final class InstanceFilter(config: PathConfig) extends Module {
   import InstanceFilter._
 
   private val numbers   = config.numbers
   private val instances = config.device.frame.instances
+  private val lanes     = 1 << log2Ceil(instances.min(maxLanes))
   private val groups    = (instances + lanes - 1) / lanes
   private val dropBits  = numbers.vertexBits + numbers.gridFraction - ObjectBox.cellBits
 
@@ -137,7 +138,7 @@ final class InstanceFilter(config: PathConfig) extends Module {
 }
 
 private object InstanceFilter {
-  val lanes:     Int = 4
+  val maxLanes:  Int = 8
   val slopeBits: Int = 6
 
   /** Of a distance in cells from an origin that lies at most half a cube outside. */

@@ -1,8 +1,8 @@
 package colonnade.instance
 
 import chisel3._
-import chisel3.util.{Cat, Decoupled, RegEnable, Valid}
-import colonnade.common.Context
+import chisel3.util.{Decoupled, RegEnable}
+import colonnade.common.{Context, DelayLine}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{InstanceNumber, ObjectInstance, Vec3}
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
@@ -42,133 +42,120 @@ final class ObjectRay(config: PathConfig) extends Bundle {
 final class InstanceTransformIO(config: PathConfig) extends Bundle {
   val instances = Input(Vec(config.device.frame.instances, new ObjectInstance(config.device)))
 
-  /** Comes only in the cycle after one with `readyNext`. */
-  val visit     = Flipped(Valid(new InstanceVisit(config)))
-  val readyNext = Output(Bool())
-
-  val ray = Decoupled(new ObjectRay(config))
+  val visit = Flipped(Decoupled(new InstanceVisit(config)))
+  val ray   = Decoupled(new ObjectRay(config))
 }
 
-/** Transforms a ray every three cycles to the axes of an object: a row of the matrix a cycle, with origin and
-  * direction. Latency: 13 cycles. Source: docs/numbers.md, section 10.
+/** Transforms a ray a cycle to the axes of an object: a product or a sum of three a stage. All stages stall together
+  * while the offered ray is not taken. Latency: ten cycles. Source: docs/numbers.md, section 10.
   */
 final class InstanceTransform(config: PathConfig) extends Module {
-  private val numbers = config.numbers
+  import InstanceTransform._
+
+  private val numbers  = config.numbers
+  private val mantissa = ObjectScale.mantissaBits(numbers)
 
   val io = IO(new InstanceTransformIO(config))
 
-  // Five stages of three cycles. All hold while a ray, which is offered in the first cycle of the last one, is not
-  // taken
-  private val phase   = RegInit(0.U(2.W))
-  private val holds   = RegInit(VecInit.fill(5)(false.B))
-  private val moves   = !io.ray.valid || io.ray.ready
-  private val isFirst = phase === 0.U
-  private val isNext  = phase === 1.U
-  private val isLast  = phase === 2.U
-  io.readyNext := isNext
-  io.ray.valid := holds.last && isFirst
-  when(moves) { phase := Mux(isLast, 0.U, phase + 1.U) }
-  when(moves && isLast) { holds.zip(io.visit.valid +: holds.init).foreach { case (to, from) => to := from } }
-  assert(!io.visit.valid || isLast, "a visit comes when none is taken")
+  // Control: a stage loads if the one before it holds a ray
+  private val holds   = RegInit(VecInit.fill(stages)(false.B))
+  private val moves   = !holds.last || io.ray.ready
+  private val arrives = io.visit.valid +: holds.init
+  private val shifts  = moves && holds.asUInt.orR
+  when(moves) { holds.zip(arrives).foreach { case (to, from) => to := from } }
+  io.visit.ready := moves
+  io.ray.valid   := holds.last
 
-  /** A value of the cycle before; of the stage before; of the second cycle of the stage before. */
-  private def delayed[T <: Data](value: T): T = RegEnable(value, moves)
-  private def staged[T <: Data](value:  T): T = RegEnable(value, moves && isLast)
-  private def early[T <: Data](value:   T): T = RegEnable(value, moves && isNext)
+  /** A value as the register of a stage; the register of stage `from` as that of stage `to`. */
+  private def load[T <: Data](value: T, stage: Int): T          = RegEnable(value, moves && arrives(stage))
+  private def hold[T <: Data](value: T, from:  Int, to: Int): T = (from + 1 to to).foldLeft(value)(load(_, _))
 
-  // The operands, in the ray's own frame, as a visit comes. Products and sums of three, by row of the matrix, reach
-  // into stage 1. Along the dominant axis the direction is 1 or -1
+  /** The same in a memory. */
+  private def delayed[T <: Data](value: T, from: Int, to: Int): T = {
+    val line = Module(new DelayLine(UInt(value.getWidth.W), to - from)).io
+    line.moves  := shifts
+    line.writes := holds(from)
+    line.in     := value.asUInt
+    line.reads  := holds(to - 1)
+    line.out.asTypeOf(value)
+  }
+
+  // The operands, in the ray's own frame
   private val visit      = io.visit.bits
-  private val info0      = staged(VisitInfo(visit))
-  private val axis0      = staged(visit.ray.orientation.axis)
-  private val axis       = Mux(isLast, visit.ray.orientation.axis, axis0)
-  private val instance   = io.instances(Mux(isLast, visit.instance, info0.instance))
-  private val shift0     = staged(instance.shift)
-  private val row        = Mux(isLast, instance.matrix(0), Mux(isFirst, instance.matrix(1), instance.matrix(2)))
-  private val factors    = PermutedFrame(row, axis).map(delayed(_))
+  private val axis       = visit.ray.orientation.axis
+  private val instance   = io.instances(visit.instance)
+  private val info       = load(VisitInfo(visit), operands)
+  private val shift      = load(instance.shift, operands)
+  private val rows       = instance.matrix.map(row => PermutedFrame(row, axis).map(load(_, operands)))
   private val fromOrigin = visit.ray.origin.zip(PermutedFrame(instance.origin, axis)).map { case (at, origin) =>
-    staged(at.integer -& origin)
+    load(at.integer -& origin, operands)
   }
-  private val slopes     = visit.ray.shear.map(shear => staged(shear.integer))
-  private val isNegative = staged(visit.ray.orientation.negative(2))
-  private val along      = delayed(Mux(isNegative, 0.S -& factors(2), factors(2))) << numbers.shearFraction
-  private val sumBits    = ObjectInstance.matrixBits + numbers.gridBits + 3
-  private def products(vector: Seq[SInt]): Seq[SInt] =
-    factors.zip(vector).map { case (factor, operand) => delayed(factor * operand) }
-  private val Seq(steps, direction) = Seq(products(fromOrigin), products(slopes.toSeq) :+ along).map { terms =>
-    delayed(Rounding.narrow(terms.reduce(_ +& _), sumBits))
+  private val slopes     = visit.ray.shear.map(shear => load(shear.integer, operands))
+  private val isNegative = load(visit.ray.orientation.negative(2), operands)
+
+  // Origin and direction in the object, by row of the matrix. Along the dominant axis the direction is 1 or -1
+  private val sumBits                     = ObjectInstance.matrixBits + numbers.gridBits + 3
+  private def sum(terms: Seq[SInt]): SInt = load(Rounding.narrow(terms.reduce(_ +& _), sumBits), sums)
+  private val shift2                      = hold(shift, operands, sums)
+  private val origins                     = rows.map { row =>
+    val steps  = sum(row.zip(fromOrigin).map { case (factor, operand) => load(factor * operand, products) })
+    val halves = (steps << 1).asSInt >> shift2
+    load(((halves +& 1.S) >> 1).asUInt(numbers.sceneBits - 1, 0).asSInt, rounded)
+  }
+  private val components = rows.map { row =>
+    val along     = load(Mux(isNegative, 0.S -& row(2), row(2)), products) << numbers.shearFraction
+    val direction = sum(row.zip(slopes).map { case (factor, slope) => load(factor * slope, products) } :+ along)
+    load(
+      Rounding.narrow(Rounding.floor(direction, ObjectInstance.directionDrop(numbers)), numbers.directionBits),
+      rounded
+    )
   }
 
-  // Stage 1: a row of origin and direction in the object each cycle
-  private val shift1    = staged(shift0)
-  private val halves    = (steps << 1).asSInt >> Mux(isLast, shift0, shift1)
-  private val origin    = delayed(((halves +& 1.S) >> 1).asUInt(numbers.sceneBits - 1, 0).asSInt)
-  private val component = delayed(
-    Rounding.narrow(Rounding.floor(direction, ObjectInstance.directionDrop(numbers)), numbers.directionBits)
-  )
-
-  // They wait for stage 4 in memories of a word for each stage on the way. An offered ray is read again
-  private val word     = RegInit(0.U(2.W))
-  private val nextWord = Mux(word === 2.U, 0.U, word + 1.U)
-  when(moves && isLast) { word := nextWord }
-  private def waiting[T <: Data](value: T, cycle: Bool): T = {
-    val memory = SyncReadMem(3, UInt(value.getWidth.W))
-    when(moves && holds(1) && cycle) { memory.write(word, value.asUInt) }
-    memory.read(Mux(isLast, nextWord, word), Mux(isLast, holds(3), !moves)).asTypeOf(value)
+  // The direction's dominant component
+  private val sizes   = components.map(component => load(Normalise.magnitude(component), magnitudes))
+  private val largest = {
+    val Seq(x, y, z) = sizes
+    load(Mux(z > y && z > x, z, Mux(y > x, y, x)), dominant)
   }
-  private val cycles     = Seq(isFirst, isNext, isLast)
-  private val info4      = waiting(staged(info0), isFirst)
-  private val origins    = cycles.map(waiting(origin, _))
-  private val components = cycles.map(waiting(component, _))
+  private val length = load(Normalise(largest, mantissa), normalised)
 
-  // Stage 2: the direction's dominant component, up to the second cycle
-  private val magnitude = delayed(Normalise.magnitude(component))
-  private val largest   = RegInit(0.U(numbers.directionBits.W))
-  when(moves && (isNext || magnitude > largest)) { largest := magnitude }
-  private val length = early(Normalise(largest, ObjectScale.mantissaBits(numbers)))
-
-  // The limit, tMax with the errors of distances, times the length, rounded up: a third of the mantissa a cycle
-  private val slack     = (numbers.distanceDigits - 4).max(0)
-  private val tMax      = staged(staged(staged(visit.tMax.integer.asUInt)))
-  private val widened   = early(tMax +& 8.U +& (tMax >> slack))
-  private val digitBits = (ObjectScale.mantissaBits(numbers) + 2) / 3
-  private val digits    = length.mantissa.pad(3 * digitBits)
-  private val digit     =
-    Mux(isLast, digits(digitBits - 1, 0), Mux(isFirst, digits(2 * digitBits - 1, digitBits), digits >> (2 * digitBits)))
-  private val high = Reg(UInt((widened.getWidth + digitBits).W))
-  private val low  = Reg(UInt((2 * digitBits).W))
-  private val sum  = Rounding.narrow(widened * digit +& Mux(isLast, widened, high >> digitBits), high.getWidth)
-  when(moves) {
-    high := sum
-    low  := Cat(high(digitBits - 1, 0), low) >> digitBits
-  }
-  private val product = high ## low
+  // The limit, tMax with the errors of distances, times the length and 2^-mantissa, rounded up
+  private val slack   = (numbers.distanceDigits - 4).max(0)
+  private val tMax    = hold(load(visit.tMax.integer.asUInt, operands), operands, dominant)
+  private val widened = load(tMax +& 8.U +& (tMax >> slack), normalised)
+  private val product = load(widened * length.mantissa, scaled) +& hold(widened, normalised, scaled)
   // product · 2^-(mantissaBits - exponent + shearFraction + shift - drop)
   private val drop   = ObjectInstance.directionDrop(numbers)
-  private val least  = ObjectScale.mantissaBits(numbers) + numbers.shearFraction - drop - numbers.directionBits
+  private val least  = mantissa + numbers.shearFraction - drop - numbers.directionBits
   private val raised = (-least).max(0)
-  private val shift3 = staged(staged(shift1))
-  private val right  = delayed(shift3 +& (least + raised + numbers.directionBits).U - length.exponent)
-  private val limit  =
+  private val shift6 = hold(shift2, sums, normalised)
+  private val right  = hold(
+    load(shift6 +& (least + raised + numbers.directionBits).U - length.exponent, scaled),
+    scaled,
+    summed
+  )
+  private val limit =
     Rounding.saturate(
-      Rounding.saturate((product << raised).asUInt >> right, numbers.sceneBits + 1) +& 2.U,
+      Rounding.saturate((load(product, summed) << raised).asUInt >> right, numbers.sceneBits + 1) +& 2.U,
       numbers.sceneBits + 1
     )
 
-  // Stage 4: the ray
+  // The ray
   private val request = io.ray.bits.request
-  request.context  := info4.context
-  request.isShadow := info4.isShadow
-  request.origin   := Vec3.of(origins.map(Fixed(new RayFormats(numbers).scene, _)))
-  request.dir      := Vec3.of(components)
+  private val along   = delayed(info, operands, limited)
+  private val from    = origins.map(delayed(_, rounded, limited))
+  request.context  := along.context
+  request.isShadow := along.isShadow
+  request.origin   := Vec3.of(from.map(Fixed(new RayFormats(numbers).scene, _)))
+  request.dir      := Vec3.of(components.map(delayed(_, rounded, limited)))
   request.limits.foreach(_ := DontCare)
   for (visit <- request.visit) {
     visit.valid         := true.B
-    visit.bits.instance := info4.instance
-    visit.bits.tMax     := delayed(limit)
+    visit.bits.instance := along.instance
+    visit.bits.tMax     := load(limit, limited)
   }
-  io.ray.bits.scale.length := early(length)
-  io.ray.bits.scale.shift  := staged(shift3)
+  io.ray.bits.scale.length := hold(length, normalised, limited)
+  io.ray.bits.scale.shift  := hold(shift6, normalised, limited)
 
   /** What goes along with a ray. */
   private final class VisitInfo extends Bundle {
@@ -186,4 +173,11 @@ final class InstanceTransform(config: PathConfig) extends Module {
       info
     }
   }
+}
+
+/** The stages by number, named after what their registers hold. */
+private object InstanceTransform {
+  val Seq(operands, products, sums, rounded, magnitudes, dominant, normalised, scaled, summed, limited) = 0 to 9
+
+  val stages: Int = limited + 1
 }

@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, OHToUInt, Valid}
+import chisel3.util.{log2Ceil, Decoupled, OHToUInt, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable, DelayLine}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{ObjectInstance, RecordFormats}
@@ -137,48 +137,62 @@ final class WorldFacesIO(config: PathConfig) extends Bundle {
   val face        = Output(Valid(new HitFace(config)))
 }
 
-/** Transforms the normals of hits to the axes of the world, a normal a cycle: some seven cycles a hit. Source:
+/** Transforms the normals of hits to the axes of the world, a normal a cycle: a hit every four cycles. Source:
   * docs/numbers.md, section 10.
   */
 final class WorldFaces(config: PathConfig) extends Module {
   val io = IO(new WorldFacesIO(config))
 
   private val vectors = 4
-  private val stored  = vectors + 1
+  private val last    = (vectors - 1).U
 
-  // A face, whose normals go round: the first one is multiplied, and comes back as the last one, of the world, two
-  // steps later. A face comes in the cycle after it may come
+  // The first normal of a face is multiplied, and the others move up. A step later the sums move into the face in the
+  // world. This one stays until it leaves, while the next face waits with its first products
   private val face     = Reg(new HitFace(config))
   private val isHeld   = RegInit(false.B)
-  private val step     = RegInit(0.U(log2Ceil(stored + 1).W))
-  private val rotates  = isHeld && step =/= stored.U
-  private val gives    = isHeld && step === stored.U && io.mayTakeNext
+  private val step     = Reg(UInt(log2Ceil(vectors).W))
+  private val world    = Reg(new HitFace(config))
+  private val isWhole  = RegInit(false.B)
+  private val sums     = RegInit(false.B)
+  private val sumStep  = Reg(UInt(log2Ceil(vectors).W))
+  private val moves    = !(isWhole && sums && sumStep === 0.U)
+  private val isReady  = isWhole || (sums && sumStep === last)
+  private val gives    = isReady && io.mayTakeNext
   private val instance = io.instances(face.instance.get)
-  io.mayComeNext := (!isHeld || gives) && !io.objectFace.valid
+  isWhole        := isReady && !gives
+  io.mayComeNext := (!isHeld || step >= (vectors - 2).U) && !io.objectFace.valid
   assert(!io.objectFace.valid || RegNext(io.mayComeNext, false.B), "a face comes when none may")
-  when(gives) { isHeld := false.B }
-  when(rotates) { step := step + 1.U }
 
   // Products of a normal and the matrix; then their sums of three, to nearest even
   private val fraction = ObjectInstance.normalFraction
   private val most     = NumberFormats.unitNormal
   private val normals  = face.normals.toSeq :+ face.geometricNormal
+  private val results  = world.normals.toSeq :+ world.geometricNormal
   private val inWorld  = instance.normal.map { row =>
     val terms = row.axes.zip(normals.head.axes).map { case (factor, each) =>
-      val term = Reg(SInt((ObjectInstance.normalBits + NumberFormats.normalBits).W))
-      term := factor * each.integer
-      term
+      RegEnable(factor * each.integer, isHeld && moves)
     }
     val raised = terms.reduce(_ +& _) +& (BigInt(1) << (fraction - 1)).S
     val whole  = Rounding.floor(raised, fraction)
     val isTie  = raised(fraction - 1, 0) === 0.U
     Rounding.saturate(Mux(isTie, whole & (-2).S, whole), -most, most)
   }
-  when(rotates) {
-    for ((to, from) <- normals.zip(normals.tail)) to      := from
-    for ((to, from) <- normals.last.axes.zip(inWorld)) to := Fixed(to.format, from)
+  when(moves) {
+    sums    := isHeld
+    sumStep := step
+    step    := step + 1.U
+    when(step === last) { isHeld := false.B }
+    for ((to, from) <- normals.zip(normals.tail)) to := from
   }
-  when(isHeld && step === 0.U) { face.material := face.material + instance.materialBase }
+  when(sums && moves) {
+    for ((to, from) <- results.zip(results.tail)) to      := from
+    for ((to, from) <- results.last.axes.zip(inWorld)) to := Fixed(to.format, from)
+    when(sumStep === 0.U) {
+      world.context  := face.context
+      world.material := face.material + instance.materialBase
+      world.instance.zip(face.instance).foreach { case (to, from) => to := from }
+    }
+  }
 
   when(io.objectFace.valid) {
     face   := io.objectFace.bits
@@ -186,7 +200,7 @@ final class WorldFaces(config: PathConfig) extends Module {
     step   := 0.U
   }
   io.grantNext.valid := gives
-  io.grantNext.bits  := face.context
+  io.grantNext.bits  := world.context
   io.face.valid      := RegNext(gives, false.B)
-  io.face.bits       := face
+  io.face.bits       := world
 }

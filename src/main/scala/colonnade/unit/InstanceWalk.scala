@@ -154,7 +154,7 @@ final class InstanceVisitsIO(config: PathConfig) extends Bundle {
   val scales   = Valid(new VisitScale(config))
 }
 
-/** Transforms rays of the world to the axes of objects: a visit every three cycles. */
+/** Transforms rays of the world to the axes of objects: a visit a cycle. */
 final class InstanceVisits(config: PathConfig) extends Module {
   val io = IO(new InstanceVisitsIO(config))
 
@@ -168,18 +168,23 @@ final class InstanceVisits(config: PathConfig) extends Module {
   waiting.in.valid := io.steps.valid
   waiting.in.bits  := io.steps.bits.context
 
-  // Ray and step are read in the cycle before a visit enters the transform
+  // Ray and step are read in the cycle before a visit is offered to the transform, and again while it is not taken
   private val transform = Module(new InstanceTransform(config)).io
-  private val reads     = waiting.out.fire
-  private val context   = waiting.out.bits
+  private val offers    = RegInit(false.B)
+  private val isTaken   = !offers || transform.visit.ready
+  private val reads     = waiting.out.fire || !isTaken
+  private val offered   = Reg(Context(config))
+  private val context   = Mux(isTaken, waiting.out.bits, offered)
   private val readStep  = steps.read(context, reads)
+  offers                        := reads
+  offered                       := context
   waiting.mayTakeNext           := true.B
-  waiting.out.ready             := transform.readyNext
+  waiting.out.ready             := isTaken
   io.rays.context.valid         := reads
   io.rays.context.bits          := context
   transform.instances           := io.instances
-  transform.visit.valid         := RegNext(reads, false.B)
-  transform.visit.bits.context  := RegNext(context)
+  transform.visit.valid         := offers
+  transform.visit.bits.context  := offered
   transform.visit.bits.isShadow := readStep.isShadow
   transform.visit.bits.ray      := io.rays.ray
   transform.visit.bits.instance := readStep.instance

@@ -68,7 +68,7 @@ class InstanceFilterSpec extends AnyFlatSpec with ChiselScalatestTester with Mat
             }
           entered += expected.flatten.sum
           val cycles = PackedStreams.run(dut, payloads)._2
-          cycles should be <= payloads.size * ((count + 3) / 4) + 5
+          cycles should be <= payloads.size * ((count + 7) / 8) + 5
         }
         entered should be > 30
       }
