@@ -79,7 +79,7 @@ class Recorded(Bench):
         self.commands.append(command)
         if command[:2] == ("colonnade", "explore"):
             study = load_study(Path(command[2])).study
-            assert ("--backend", "rtl") == command[3:5] or not study.cycles
+            assert command[3:5] == ("--backend", "rtl") or not study.cycles
         if command[0] == "colonnade":
             parse_colonnade([part for part in command[1:]])
         raise Differs("noted")

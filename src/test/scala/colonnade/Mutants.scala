@@ -186,8 +186,8 @@ object RandomMutants {
     }
   }
 
-  /** A test without a fault, if it simulates a circuit that has some; its name if it fails. Its seconds are also those of
-    * its simulator, which tests of a suite may share: the first one builds it.
+  /** A test without a fault, if it simulates a circuit that has some; its name if it fails. Its seconds include the
+    * build of its simulator, which tests of a suite may share: the first one builds it.
     */
   private def clean(suite: Suite, name: String): Either[String, Option[Test]] = {
     Mutants.present.clear()
