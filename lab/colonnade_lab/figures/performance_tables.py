@@ -114,9 +114,9 @@ def simulators(data: Data) -> str:
         [row["by"], row["simulator"], f"{row['cycles']:,}", f"{row['cycles_per_second']:,.0f}"]
         for row in found["simulators"]
     ]
-    sleep = found["sleep"]
+    sleep, simulator = found["sleep"], found["simulators"][0]["simulator"]
     rows += [
-        [f"`edge`, bunny, {name}", "Verilator 5.006", f"{sleep['cycles']:,}", f"{sleep[key]:,.0f}"]
+        [f"`edge`, bunny, {name}", simulator, f"{sleep['cycles']:,}", f"{sleep[key]:,.0f}"]
         for key, name in (("asleep", "idle units sleep"), ("awake", "none sleeps"))
     ]
     return markdown(["by", "simulator", "cycles", "cycles by a CPU second"], rows)
